@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import dynakin
+from dynakin.arrays import rms
 from dynakin.results.measures.sources import DERIVED, MEASURED
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
@@ -79,16 +80,13 @@ def errors(estimate: dynakin.Estimate, trial: SimulatedTrial, motion: str) -> Er
     }
     speed = np.sqrt(np.mean(off["speeds"][window] ** 2, axis=0))
     return Errors(
-        tuple(names), angle.std(axis=0), angle.mean(axis=0), speed, rms(moments[MEASURED]), rms(moments[DERIVED])
+        tuple(names),
+        angle.std(axis=0),
+        angle.mean(axis=0),
+        speed,
+        rms(moments[MEASURED], axis=0),
+        rms(moments[DERIVED], axis=0),
     )
-
-
-def rms(values: Array) -> Array:
-    """Over the frames (T, n); NaN where there are none."""
-    told = np.isfinite(values).any(axis=0)
-    found = np.full(values.shape[1], np.nan)
-    found[told] = np.sqrt(np.nanmean(values[:, told] ** 2, axis=0))
-    return found
 
 
 def one_trial(motion: str, markers: str, seed: int, changes: dict[str, float]) -> dict[str, Errors]:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from pages import put
 
+from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import load_model
 from dynakin.recordings.read import read
 from dynakin.settings.defaults import HORIZON_S
@@ -69,7 +70,9 @@ def figures(part: Part, model: str) -> Figures | None:
         recording = recording.window(*part.seconds)
     static = read(DATA / trial.static) if trial.static else None
     mass_kg = part.weighed_kg or trial.mass_kg
-    return unseen_figures(recording, Setup(load_model(trial.model(model), Subject(mass_kg=mass_kg))), static=static)
+    return unseen_figures(
+        recording, Setup(Estimator(load_model(trial.model(model), Subject(mass_kg=mass_kg)))), static=static
+    )
 
 
 def kept(part: Part, model: str) -> Path:

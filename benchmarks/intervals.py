@@ -11,7 +11,7 @@ depend on: trial, noise, package and this file (--again: made anew).
 
 Groups and figures are truth3d's: angles with their mean error taken off, means over coordinates and seeds; deviation
 over error is the median of a group's angles and speeds. --choose searches the sizes of one kind of model over all cases
-asked for; --sizes tries some. What is chosen goes into `filter/systematic.py` by hand.
+asked for; --sizes tries some. What is chosen goes into `filter/error_sizes.py` by hand.
 """
 
 from __future__ import annotations
@@ -29,18 +29,9 @@ from scipy.optimize import minimize
 from source_digest import source_digest
 
 import dynakin
-from dynakin.filter.systematic import (
-    BLOCKS,
-    LANDMARKS,
-    SCALED,
-    Parts,
-    Sizes,
-    Systematic,
-    any_off_plates,
-    reported,
-    states_of,
-    usual_sizes,
-)
+from dynakin.filter.error_sizes import LANDMARKS, SCALED, Sizes, usual_sizes
+from dynakin.filter.reported_sd import BLOCKS, Parts, reported
+from dynakin.filter.systematic import Systematic, any_off_plates, states_of
 from dynakin.model.definition import load_model
 from dynakin.results.measures.sources import MEASURED, moment_sources
 from dynakin.settings import presets

@@ -20,6 +20,8 @@ from opensim_peer import Kinematics, inverse_kinematics, load, residual
 from peers_times import times
 
 import dynakin
+from dynakin.arrays import rms, wrench_about
+from dynakin.filter.estimator import Estimator
 from dynakin.filter.samples import recording_arrays
 from dynakin.model.definition import Definition, load_model
 from dynakin.model.opensim.definition import load_opensim
@@ -51,10 +53,6 @@ def recorded(name: str) -> Recording:
 def models(name: str) -> dict[str, Definition]:
     subject = Subject(mass_kg=MASS[name], height_m=1.70)
     return {"fullbody": load_model("fullbody", subject), ".osim": load_opensim(FILE, subject)}
-
-
-def rms(values: Array, axis: int | None = None) -> Array:
-    return np.sqrt(np.nanmean(np.asarray(values) ** 2, axis=axis))
 
 
 def distance_mm(measured: Array, placed: Array) -> float:
@@ -102,11 +100,6 @@ def mean_pressure(recording: Recording) -> Array:
     load_n = np.stack([plate.force[:, 1] for plate in recording.plates])
     centre = np.stack([np.nan_to_num(plate.cop) for plate in recording.plates])
     return np.asarray((load_n[..., None] * centre).sum(axis=(0, 1)) / load_n.sum())
-
-
-def about(wrench: Array, point: Array) -> Array:
-    """A wrench (T, 6) about the ground's origin, about a point instead."""
-    return np.concatenate([wrench[:, :3], wrench[:, 3:] - np.cross(point, wrench[:, :3])], axis=1)
 
 
 def components(wrench: Array) -> str:
@@ -230,17 +223,17 @@ def forecast(peer: Kinematics) -> None:
     first, second = halves(recorded("squats1"))
     last = peer.time >= second.time[0] - 1e-9
     centre = mean_pressure(recorded("squats1"))
-    misfit = about(opensim_misfit(peer, MASS["squats1"], 6.0)[1], centre)
+    misfit = wrench_about(opensim_misfit(peer, MASS["squats1"], 6.0)[1], centre)
     print(f"| OpenSim, 6 Hz, 60.05 kg, whole trial | {components(misfit)} |")
     print(f"| the same, second half | {components(misfit[last[: len(misfit)]])} |")
     for name, definition in models("squats1").items():
-        identified = identify_on(first, Setup(definition), same_recording=True)
+        identified = identify_on(first, Setup(Estimator(definition)), same_recording=True)
         blind = predict_blind(identified, second)
         truth = measured_wrench(second, blind.start)
         point = blind.start.ground.points_to_ground(centre)
         for method, wrench in blind.wrenches.items():
             if method.startswith("EKF") or "persistence: mean" in method:
-                print(f"| dynakin, {name}: {method} | {components(about(wrench - truth, point))} |", flush=True)
+                print(f"| dynakin, {name}: {method} | {components(wrench_about(wrench - truth, point))} |", flush=True)
 
 
 def main() -> None:

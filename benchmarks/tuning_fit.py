@@ -66,7 +66,7 @@ def main() -> None:
             "fit nll, motion": fitted(first, base, pool, MOTION, "nll"),
             "fit ahead": fitted(first, base, pool, MOTION, "ahead"),
         }
-    withheld = plates_withheld(recording, Setup(definition, noises), static=static)
+    withheld = plates_withheld(recording, Setup(Estimator(definition), noises), static=static)
     for name, noise in noises.items():
         told = undoubting(noise.changed(total_mass_use="prior", total_mass_variance_kg2=base.total_mass_variance_kg2))
         row = figures_of(second, told, base)

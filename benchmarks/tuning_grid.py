@@ -15,8 +15,7 @@ from pathlib import Path
 import dynakin
 from dynakin.filter.estimator import Estimator
 from dynakin.settings import presets
-from dynakin.studies.engine.folder import ROWS, open_folder
-from dynakin.studies.engine.journal import Journal
+from dynakin.studies.engine.journal import ROWS, Journal, open_folder
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.tuning.grid import belongs_to, paper_axes, run_grid
 from dynakin.studies.tuning.output import write_grid

@@ -25,11 +25,9 @@ from dynakin.report.paper_figures.sensitivity import Sensitivity
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
 from dynakin.simulation.trial import simulate
-from dynakin.studies.engine.folder import ROWS, open_folder
-from dynakin.studies.engine.journal import Journal
-from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.engine.journal import ROWS, Journal, open_folder
+from dynakin.studies.engine.pools import open_pool, work
 from dynakin.studies.engine.tasks import Task
-from dynakin.studies.engine.work import work
 from dynakin.studies.tuning.grid import axis, combinations, mean_row
 from dynakin.studies.tuning.score import CRITERIA, figures_from, run_score
 from dynakin.studies.tuning.trial import TuningTrial, prepare, undoubting

@@ -19,8 +19,8 @@ ROOT = Path(__file__).resolve().parents[1]
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
     """Folder of the real recordings; the test is skipped where it is absent."""
-    told = os.environ.get("DYNAKIN_TEST_DATA")
-    folder = Path(told) if told else ROOT.parent / "shared" / "data"
+    named = os.environ.get("DYNAKIN_TEST_DATA")
+    folder = Path(named) if named else ROOT.parent / "shared" / "data"
     if not folder.is_dir():
         pytest.skip(f"real recordings not found in {folder} (set DYNAKIN_TEST_DATA)")
     return folder

@@ -7,11 +7,12 @@ from contextlib import suppress
 
 import numpy as np
 
+from dynakin.arrays import wrench_about
 from dynakin.bindings import _core
 from dynakin.errors import DynakinError, RecordingError
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.batch import FIRST_SIGMA, Posterior, at_start, identify_batch
-from dynakin.identification.trials import Common, MeasuredTrial, about
+from dynakin.identification.trials import Common, MeasuredTrial
 from dynakin.identification.unknowns import Unknowns
 from dynakin.recordings.recording import Recording
 from dynakin.settings import presets
@@ -41,12 +42,12 @@ def regressor(common: Common, trial: MeasuredTrial) -> Array:
     """(T, r, e) about the trial's reference point: the wrench is linear in phi."""
     unknowns = Unknowns.of(common)
     rows = np.array([_core.wrench_jacobian(common.core, x) for x in trial.movement.states])[:, :, unknowns.inertia]
-    return about(rows.swapaxes(1, 2), trial.reference).swapaxes(1, 2)[:, common.rows]
+    return wrench_about(rows.swapaxes(1, 2), trial.reference).swapaxes(1, 2)[:, common.rows]
 
 
 def known(common: Common, trial: MeasuredTrial) -> tuple[Array, Array, Array]:
     """Regressor (T, r, e), wrench (T, r) and the frames (T,) in which it is known."""
-    wrench = about(trial.wrench, trial.reference)[:, common.rows]
+    wrench = wrench_about(trial.wrench, trial.reference)[:, common.rows]
     return regressor(common, trial), wrench, np.isfinite(wrench).all(axis=1)
 
 

@@ -21,9 +21,10 @@ from candidates import all_candidates, predicted
 from simulated import judged
 
 import dynakin
+from dynakin.arrays import wrench_about
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.subject import identify_subject
-from dynakin.identification.trials import Common, MeasuredTrial, Movement, about
+from dynakin.identification.trials import Common, MeasuredTrial, Movement
 from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.recording import Recording
 from dynakin.units import COMPONENTS
@@ -57,7 +58,7 @@ def of_movement(movement: Movement, recording: Recording, wrench: Array) -> Arra
 def judged_walking(common: Common, trial: MeasuredTrial, wrench: Array) -> Array:
     """RMS (r,) of the error about its mean, where every foot is on a plate, scaled to the mass that its plates read."""
     inside = (trial.movement.time >= WALKING_S[0]) & (trial.movement.time <= WALKING_S[1])
-    error = about(trial.wrench - WALKING_KG / MASS_KG * wrench, trial.reference)[inside][:, common.rows]
+    error = wrench_about(trial.wrench - WALKING_KG / MASS_KG * wrench, trial.reference)[inside][:, common.rows]
     return np.asarray(np.nanstd(error, axis=0))
 
 

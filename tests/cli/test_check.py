@@ -16,7 +16,7 @@ from dynakin.simulation.trial import simulate
 Said = pytest.CaptureFixture[str]
 
 
-def told(capsys: Said) -> tuple[str, str]:
+def printed(capsys: Said) -> tuple[str, str]:
     """What stands on stdout and stderr, without line breaks."""
     said = capsys.readouterr()
     return " ".join(said.out.split()), " ".join(said.err.split())
@@ -29,7 +29,7 @@ def ran(arguments: list[str], out: Path) -> int:
 def test_what_is_there_and_what_run_would_do(data_dir: Path, capsys: Said) -> None:
     trial = str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d")
     assert main(["check", trial, "--model", "squat7", "--mass", "78.6"]) == 0
-    found, _ = told(capsys)
+    found, _ = printed(capsys)
     for words in ("317 frames at 100 Hz", "2 force plates", "Vertical +Z", "RSHO seen in 78.5 %", "abdomen"):
         assert words in found
     assert "Marker set plug-in-gait" in found and "markers by name; next best" in found
@@ -50,9 +50,9 @@ def test_check_refuses_as_run_does(
 ) -> None:
     trial = str(data_dir / "plugin_gait" / "GaitNormal_1.c3d")
     assert main(["check", trial, *options]) == 1
-    _, checked = told(capsys)
+    _, checked = printed(capsys)
     assert ran([trial, *options], tmp_path / "out") == 2
-    assert told(capsys)[1] == checked
+    assert printed(capsys)[1] == checked
     assert refusal in checked
 
 
@@ -60,7 +60,7 @@ def test_where_only_the_mass_is_missing_all_else_is_said(data_dir: Path, capsys:
     """A chair bears part of the person, so that the plates weigh nobody."""
     folder = data_dir / "opencap_subject4"
     assert main(["check", str(folder / "STS1.trc"), "--forces", str(folder / "STS1_grf.mot")]) == 1
-    found, refusal = told(capsys)
+    found, refusal = printed(capsys)
     assert "mass_kg is not given and cannot be found" in refusal
     for words in ("The mass is missing.", "--mass KG", "--static static1.trc", "under the right foot", "Contacts"):
         assert words in found
@@ -71,9 +71,9 @@ def test_check_promises_what_run_keeps(data_dir: Path, tmp_path: Path, capsys: S
     """Without an option: the same moments for the same reasons, what is assumed said first."""
     trial = str(data_dir / "pycgm" / "Movement_trial.c3d")
     assert main(["check", trial]) == 0
-    found, _ = told(capsys)
+    found, _ = printed(capsys)
     assert ran([trial], tmp_path / "out") == 0
-    said, _ = told(capsys)
+    said, _ = printed(capsys)
     moments = json.loads((tmp_path / "out" / "metrics.json").read_text())["moments"]
     assert moments["verdict"] in found and all(reason in found for reason in moments["reasons"])
     first = said[: said.index(moments["verdict"])]
@@ -95,9 +95,9 @@ def test_forces_next_to_a_recording_are_named_and_do_what_is_said(tmp_path: Path
     forces = tmp_path / "squat1_grf.mot"
     write_storage(forces, "forces", made.time, columns, np.hstack(values), in_degrees=False)
     main(["check", str(trial), "--mass", "70"])
-    assert "--forces squat1_grf.mot (found next to the recording)" in told(capsys)[0]
+    assert "--forces squat1_grf.mot (found next to the recording)" in printed(capsys)[0]
     assert main(["check", str(trial), "--mass", "70", "--forces", str(forces)]) == 0
-    found, _ = told(capsys)
+    found, _ = printed(capsys)
     assert "Leg moments: measured in all" in found and "--forces" not in found
     assert "1 under the right foot" in found or "2 under the right foot" in found
     assert "Held: knee adduction (both sides)" in found
@@ -110,10 +110,10 @@ def test_a_planar_model_is_checked_as_it_runs(tmp_path: Path, capsys: Said) -> N
     write_trc(trial, made.time, list(made.marker_names), made.markers, unit="mm")
     options = [str(trial), "--model", "sagittal7", "--mass", "70"]
     assert main(["check", *options]) == 1
-    _, checked = told(capsys)
+    _, checked = printed(capsys)
     assert "no force plates" in checked
     assert ran(options, tmp_path / "out") == 2
-    assert told(capsys)[1] == checked
+    assert printed(capsys)[1] == checked
     trial.write_text("nothing")
     assert main(["check", *options]) == 1
     assert main(["check", *options, "--side", "middle"]) == 2
@@ -121,11 +121,11 @@ def test_a_planar_model_is_checked_as_it_runs(tmp_path: Path, capsys: Said) -> N
 
 def test_run_names_what_lies_next_to_a_recording(data_dir: Path, tmp_path: Path, capsys: Said) -> None:
     assert main(["run", str(data_dir / "rajagopal" / "motion_capture_run.trc"), "-o", str(tmp_path / "out")]) == 2
-    _, refusal = told(capsys)
+    _, refusal = printed(capsys)
     assert refusal.endswith("Give --static static_run.trc?")
     walk = str(data_dir / "opencap_subject4" / "walking1.trc")
     assert main(["check", walk]) == 0
-    found, _ = told(capsys)
+    found, _ = printed(capsys)
     assert "--forces walking1_grf.mot lies next to the recording" in found
 
 

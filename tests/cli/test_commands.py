@@ -57,29 +57,29 @@ def test_model_lists_and_describes(capsys: Said) -> None:
     listed = capsys.readouterr().out
     assert all(name in listed for name in (*available_models(), *available_marker_sets()))
     assert main(["model", "squat7"]) == 0
-    told = capsys.readouterr().out
+    printed = capsys.readouterr().out
     for word in ("thorax", "ankle", "-50 to 50", "RKNE", "4 x 7"):
-        assert word in told
+        assert word in printed
 
 
 def test_model_says_what_it_lets_one_identify(capsys: Said) -> None:
     assert main(["model", "squat7", "--identifiability", "--mass", "60"]) == 0
-    told = " ".join(capsys.readouterr().out.split())
+    printed = " ".join(capsys.readouterr().out.split())
     for words in (
         "22 of 28 inertial numbers",
         "foot mass + mass of all that it carries",
         "arm: a turn about the shoulder",
     ):
-        assert words.lower() in told.lower()
+        assert words.lower() in printed.lower()
 
 
 def test_model_says_what_a_trial_tells(data_dir: Path, capsys: Said) -> None:
     folder = data_dir / "opencap_subject4"
     trial = ["--trial", str(folder / "squats1.trc"), "--forces", str(folder / "squats1_grf.mot"), "--mass", "60.05"]
     assert main(["model", "sagittal7", "--identifiability", *trial]) == 0
-    told = " ".join(capsys.readouterr().out.split())
+    printed = " ".join(capsys.readouterr().out.split())
     for words in ("Lengths (6): 5 known from the data", "Movements that would help", "the foot's mass, first"):
-        assert words in told
+        assert words in printed
 
 
 @pytest.mark.parametrize(
@@ -102,8 +102,8 @@ def test_options_of_identifiability_that_do_not_fit(arguments: list[str], expect
 def test_demo_compares_with_the_truth_and_says_where_the_report_lies(tmp_path: Path, capsys: Said) -> None:
     out = tmp_path / "demo"
     assert main(["demo", "-o", str(out), "--duration", "6"]) == 0
-    told = capsys.readouterr().out
-    assert "RMS error against the truth" in told and str(out / "report.html") in told.replace("\n", "")
+    printed = capsys.readouterr().out
+    assert "RMS error against the truth" in printed and str(out / "report.html") in printed.replace("\n", "")
     assert {entry.name for entry in out.iterdir()} == {*OUTPUT_FILES, *OF_THE_BODY}
     page = (out / "report.html").read_text()
     assert 'id="methods"' in page and "classical (6 Hz)" in page and "against AT" in page
@@ -116,8 +116,8 @@ def test_run_on_real_data_and_again_from_its_own_configuration(data_dir: Path, t
     forces = ["--forces", str(folder / "squats1_grf.mot")]
     out, again = tmp_path / "out", tmp_path / "again"
     assert main(["run", str(folder / "squats1.trc"), *forces, *options, "-o", str(out)]) == 0
-    told = capsys.readouterr().out
-    assert "17 markers" in told and "Verdict:" in told
+    printed = capsys.readouterr().out
+    assert "17 markers" in printed and "Verdict:" in printed
     metrics = json.loads((out / "metrics.json").read_text())
     assert metrics["markers"]["mean_rms_mm"] <= 4.0
     rms = metrics["wrench"]["rms"]
@@ -143,18 +143,18 @@ def test_run_smooths_unless_told_otherwise_and_says_where_it_cannot(
     def used(name: str, *more: str) -> tuple[float, str]:
         out = tmp_path / name
         assert main(["run", trial, *options, str(out), *more]) == 0
-        told = " ".join(capsys.readouterr().out.split())
-        return tomllib.loads((out / "config.toml").read_text())["lag_s"], told
+        printed = " ".join(capsys.readouterr().out.split())
+        return tomllib.loads((out / "config.toml").read_text())["lag_s"], printed
 
-    lag_s, told = used("default")
-    assert lag_s == math.inf and "settled after" not in told and "does not settle" not in told
-    lag_s, told = used("live", "--live-like")
-    assert lag_s == 0.0 and "settled after" in told and "Not smoothed" not in told
-    lag_s, told = used("late", "--lag", "0.05")
-    assert lag_s == pytest.approx(0.05) and "settled after" in told
+    lag_s, printed = used("default")
+    assert lag_s == math.inf and "settled after" not in printed and "does not settle" not in printed
+    lag_s, printed = used("live", "--live-like")
+    assert lag_s == 0.0 and "settled after" in printed and "Not smoothed" not in printed
+    lag_s, printed = used("late", "--lag", "0.05")
+    assert lag_s == pytest.approx(0.05) and "settled after" in printed
     assert "each frame estimated as it would be live, 50 ms late" in (tmp_path / "late" / "report.html").read_text()
-    lag_s, told = used("paper", "--preset", "paper")
-    assert lag_s == 0.0 and "Not smoothed: bounds are kept by constraint 'gain'" in told
+    lag_s, printed = used("paper", "--preset", "paper")
+    assert lag_s == 0.0 and "Not smoothed: bounds are kept by constraint 'gain'" in printed
     assert "Not smoothed: bounds" in (tmp_path / "paper" / "report.html").read_text()
     assert main(["run", trial, *options, str(tmp_path / "no"), "--preset", "paper", "--smooth"]) == 2
     assert "lag_s: bounds are kept by constraint 'gain'" in capsys.readouterr().err

@@ -34,9 +34,9 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 def test_one_trial_gives_table_ii_on_screen_and_as_files(trial: list[str], tmp_path: Path, capsys: Said) -> None:
     out = tmp_path / "comparison"
     assert main(["compare", *trial, *SUBJECT, "-o", str(out)]) == 0
-    told = capsys.readouterr().out
+    printed = capsys.readouterr().out
     for word in ("EKF (default)", "AT (6 Hz)", "classical (6 Hz)", "FY", "N m", "knee", "squats after the adaptation"):
-        assert word in told
+        assert word in printed
     rows = rows_of(out / "table2.csv")
     assert {row["quantity"] for row in rows} >= {"markers", "fx", "fy", "mz", "r_knee"}
     summary = json.loads((out / "comparison.json").read_text())
@@ -66,8 +66,8 @@ def test_many_trials_give_mean_and_deviation(trial: list[str], tmp_path: Path, c
 def test_halves_and_unseen_stand_beside_persistence(trial: list[str], tmp_path: Path, capsys: Said) -> None:
     out = tmp_path / "comparison"
     assert main(["compare", *trial, *SUBJECT, "--halves", "--unseen", "--horizon-ms", "50", "-o", str(out)]) == 0
-    told = capsys.readouterr().out
-    assert "markers, second half" in " ".join(told.split()) and "50 ms ahead" in told
+    printed = capsys.readouterr().out
+    assert "markers, second half" in " ".join(printed.split()) and "50 ms ahead" in printed
     assert {row["method"] for row in rows_of(out / "held_out.csv")} >= {"EKF (default), table", "persistence: mean"}
     page = (out / "report.html").read_text()
     assert "EKF (default), identified" in page and "50 ms ahead" in page

@@ -66,7 +66,7 @@ def test_a_recording_that_the_disk_cannot_take_is_no_success(tmp_path: Path) -> 
 
 
 def test_an_identified_subject_is_refused_where_it_is_another_models(tmp_path: Path, capsys: Said) -> None:
-    """What is told of it comes from `run`; here only that the file is read and reaches the model."""
+    """What is said of it comes from `run`; here only that the file is read and reaches the model."""
     source = "simulate:squat,model=sagittal7,duration=5,speed=0"
     wrong = tmp_path / "subject.toml"
     wrong.write_text('model = "squat7"\n')

@@ -70,9 +70,9 @@ def test_a_run_keeps_its_results(study: Path, tmp_path: Path, name: str, capsys:
         trial.write_bytes((study / "squat.trc").read_bytes())
     output = tmp_path / "out"
     assert run(study, trial.name, output) == 0, capsys.readouterr().err
-    told = {p["name"]: p for p in json.loads((output / "parameters.json").read_text())["parameters"]}
-    assert [told[name]["segment"] for name in NAMES] == ["thigh/leg", "thigh/leg"]
-    assert [told[name]["unit"] for name in NAMES] == ["m", "kg"]
+    written = {p["name"]: p for p in json.loads((output / "parameters.json").read_text())["parameters"]}
+    assert [written[name]["segment"] for name in NAMES] == ["thigh/leg", "thigh/leg"]
+    assert [written[name]["unit"] for name in NAMES] == ["m", "kg"]
     with xr.open_dataset(output / "estimate.nc") as data:
         assert set(NAMES) <= set(data["element"].values)
     assert "r_A/B" in read(output / "markers.trc").marker_names

@@ -76,7 +76,7 @@ def test_possible_bodies_are_left_alone(spec):
 
 
 def single_body(planar, seed, estimated=None):
-    """One segment on a hinge, with all of its inertia estimated unless told."""
+    """One segment on a hinge, with all of its inertia estimated unless given otherwise."""
     phi = inertia(np.random.default_rng(seed))
     estimated = estimated or (PLANAR_INERTIA if planar else [True] * 10)
     body = Segment("body", "ground", axes=[Axis("q", "rotation", np.array([0, 0, 1.0]))])

@@ -350,7 +350,7 @@ def test_deviations_are_those_of_many_trials(contact):
 @pytest.mark.parametrize("contact", [(UNMEASURED, UNMEASURED), (MEASURED, UNMEASURED)])
 def test_deviations_with_contacts_states_are_those_of_many_trials(contact):
     """The filter takes the total with its white errors and the states' effects, the moments take both again by foot:
-    drawn from the prior, the error's mean square is the variance that is told."""
+    drawn from the prior, the error's mean square is the variance that is reported."""
     spec = with_contacts(MODELS[1], FEET)
     model, layout = model_of(spec), Layout(spec)
     rng = np.random.default_rng(27)
@@ -419,7 +419,7 @@ def test_a_run_reports_the_same_frame_by_frame(spec):
         "wrench_sd",
         "markers_estimated",
         "nis",
-    ):  # how the wrench is measured is told apart
+    ):  # how the wrench is measured is given apart
         np.testing.assert_array_equal(out[name], plain[name])
     for k in range(len(data.time)):
         if k:

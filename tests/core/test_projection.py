@@ -59,7 +59,7 @@ def test_equals_an_independent_least_distance_problem(spec, common):
 
 @each_spec
 def test_one_bound_moves_the_correlated_states_along(spec):
-    """x + P e_i (b - x_i) / P_ii: the same as being told the value of that element, for the mean."""
+    """x + P e_i (b - x_i) / P_ii: the same as knowing the value of that element, for the mean."""
     rng = np.random.default_rng(3)
     x, n = Layout(spec).initial_state(), Layout(spec).size
     P = covariance(n, rng)
@@ -139,8 +139,8 @@ def test_bounds_out_of_reach_are_reported_and_kept_one_by_one(spec):
     equality[0, 4] = 1.0
     out = project(spec, x, P, lower=lower, upper=upper, equality=equality, equality_value=np.array([x[4] + 5.0]))
     assert not out.met
-    told, _ = projection.condition(x, P, equality, np.array([x[4] + 5.0]))
-    np.testing.assert_allclose(out.x, np.clip(told, lower, upper), rtol=1e-9, atol=1e-12)
+    conditioned, _ = projection.condition(x, P, equality, np.array([x[4] + 5.0]))
+    np.testing.assert_allclose(out.x, np.clip(conditioned, lower, upper), rtol=1e-9, atol=1e-12)
 
 
 def test_equalities_need_the_projection():

@@ -52,15 +52,15 @@ def test_angles_speeds_and_moments_are_near_the_truth(plain: Estimate, trial: Si
 
 
 def test_lengths_are_as_sure_as_skin_allows(plain: Estimate, trial: SimulatedTrial) -> None:
-    """Skin that follows an angle looks like a length: what is told of a length covers the truth, the filter's own part
-    alone would not."""
+    """Skin that follows an angle looks like a length: what is reported of a length covers the truth, the filter's own
+    part alone would not."""
     lengths = [p for p in plain.parameters if p.kind == "length"]
     error = np.array([p.value - trial.truth.parameters[p.name] for p in lengths])
-    told, own = (np.array([getattr(p, name) for p in lengths]) for name in ("sd", "posterior_sd"))
+    reported, own = (np.array([getattr(p, name) for p in lengths]) for name in ("sd", "posterior_sd"))
     thigh = next(p for p in lengths if p.name == "length/thigh")
     assert thigh.skin_sd == pytest.approx(0.6 * 0.018)  # 0.6 of the 18 mm that the marker set declares of the thigh
     assert thigh.sd == pytest.approx(np.hypot(thigh.skin_sd, thigh.posterior_sd))
-    assert np.mean((error / told) ** 2) < 1.5 and np.mean((error / own) ** 2) > 2.0
+    assert np.mean((error / reported) ** 2) < 1.5 and np.mean((error / own) ** 2) > 2.0
     assert all(p.skin_sd == 0.0 for p in plain.parameters if p.kind != "length")
 
 
@@ -175,10 +175,10 @@ def test_deviations_on_demand_are_those_of_the_run(trial: SimulatedTrial, plain:
 def test_plates_that_lag_are_brought_into_step() -> None:
     late = simulate_squat(seed=3, duration_s=10.0, noise=SensorNoise(plate_lag_s=0.04))
     result = estimator().run(late.recording)
-    told = [text for text in result.messages if text.startswith("The plates are ")]
-    assert len(told) == 1 and told[0].endswith("they were brought into step.")
-    lag_ms = float(told[0].split()[3])
-    assert lag_ms == pytest.approx(40.0, abs=4.0) and "behind" in told[0]
+    said = [text for text in result.messages if text.startswith("The plates are ")]
+    assert len(said) == 1 and said[0].endswith("they were brought into step.")
+    lag_ms = float(said[0].split()[3])
+    assert lag_ms == pytest.approx(40.0, abs=4.0) and "behind" in said[0]
     aside = estimator(noise=dynakin.presets.default().changed(plate_delay_sd_s=0.0)).run(late.recording)
     assert rms(result, late, "moments").mean() < 0.6 * rms(aside, late, "moments").mean()
 
@@ -214,9 +214,9 @@ def test_swapped_and_flying_markers_are_refused_and_said(trial: SimulatedTrial, 
         markers[600:700, wrist] += [0.3, 0.4, 0.0]
 
     result = estimator().run(with_markers(trial.recording, faults))
-    told = {event.subject: event for event in result.events if event.kind == "gated"}
-    assert {"r_knee", "r.ASIS", "C7"} <= set(told)
-    assert told["C7"].time_s == pytest.approx(6.0) and "100 frames" in told["C7"].message
+    refused = {event.subject: event for event in result.events if event.kind == "gated"}
+    assert {"r_knee", "r.ASIS", "C7"} <= set(refused)
+    assert refused["C7"].time_s == pytest.approx(6.0) and "100 frames" in refused["C7"].message
     for before, after in zip(plain.parameters, result.parameters, strict=True):
         if before.kind in ("length", "inertia"):
             assert abs(after.value - before.value) < before.sd, before.name
@@ -277,6 +277,6 @@ def test_a_mass_that_the_plates_contradict_is_told_and_is_no_delay() -> None:
     wrong = dynakin.Subject(mass_kg=78.0, height_m=1.75, sex="male")
     model = dynakin.load_model("sagittal7", wrong, markers="opencap")
     result = dynakin.Estimator(model, dynakin.presets.default()).run(late.recording)
-    told = [text for text in result.messages if text.startswith("Warning: the plates carry 70.")]
-    assert len(told) == 1 and "78.0 kg (10.3 % apart" in told[0]
+    said = [text for text in result.messages if text.startswith("Warning: the plates carry 70.")]
+    assert len(said) == 1 and "78.0 kg (10.3 % apart" in said[0]
     assert not any("brought into step" in text for text in result.messages)

@@ -1,4 +1,4 @@
-"""fullbody on real people: nothing but mass and height is told."""
+"""fullbody on real people: nothing but mass and height is given."""
 
 from __future__ import annotations
 

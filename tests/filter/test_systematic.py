@@ -14,24 +14,10 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
+from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes
 from dynakin.filter.joint_errors import JointErrors
-from dynakin.filter.systematic import (
-    _STEP_S,
-    BLOCKS,
-    COMMON,
-    KINDS,
-    LANDMARKS,
-    OWN_AT_ONCE,
-    OWN_LATE,
-    SCALED,
-    SKIN_ANGLE_RAD,
-    SPEEDS_STILL,
-    Sizes,
-    Systematic,
-    any_off_plates,
-    movement_intensity,
-    reported,
-)
+from dynakin.filter.reported_sd import BLOCKS, OWN_AT_ONCE, OWN_LATE, SPEEDS_STILL, movement_intensity, reported
+from dynakin.filter.systematic import _STEP_S, COMMON, SKIN_ANGLE_RAD, Systematic, any_off_plates
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
 from dynakin.settings.noise import Noise
 

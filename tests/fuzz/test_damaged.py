@@ -318,9 +318,9 @@ def test_samples_of_another_shape(started: Tracker, time: Any, marker: Any, plat
 
 def session(trial: SimulatedTrial, *, markers: list[str] | None = None) -> list[bytes]:
     recording = trial.recording
-    told = {"names": markers or list(recording.marker_names), "rate_hz": 50.0, "clock": "a"}
+    stream = {"names": markers or list(recording.marker_names), "rate_hz": 50.0, "clock": "a"}
     plates = {"names": ["plate 1"], "rate_hz": 50.0, "clock": "a"}
-    records = [text_record({"streams": {"markers": told, "plates": plates}, "settings": {}})]
+    records = [text_record({"streams": {"markers": stream, "plates": plates}, "settings": {}})]
     for t, frame, wrench in zip(recording.time, recording.markers, recording.total_wrench(), strict=True):
         records.append(packet_record(PlatePacket(np.array([t]), wrench[None, None], 100.0 + t)))
         records.append(packet_record(MarkerPacket(float(t), frame, 100.0 + t)))
@@ -337,7 +337,7 @@ def test_a_damaged_record_of_a_session_is_passed_over(trial: SimulatedTrial, tmp
 
 
 @pytest.mark.parametrize(
-    ("told", "expected"),
+    ("streams", "expected"),
     [
         ({"markers": {"names": ["a"]}}, "its streams are not described as expected"),
         ({"markers": {"names": ["a"], "rate_hz": 0.0, "clock": "a"}, "plates": None}, "0 Hz"),
@@ -345,8 +345,8 @@ def test_a_damaged_record_of_a_session_is_passed_over(trial: SimulatedTrial, tmp
         ([], "its streams are not described"),
     ],
 )
-def test_a_session_whose_streams_are_not_told(tmp_path: Path, told: Any, expected: str) -> None:
-    (tmp_path / FILE).write_bytes(text_record({"streams": told, "settings": {}}))
+def test_a_session_whose_streams_are_not_described(tmp_path: Path, streams: Any, expected: str) -> None:
+    (tmp_path / FILE).write_bytes(text_record({"streams": streams, "settings": {}}))
     refused(lambda: recorded(tmp_path), RecordingError, expected)
 
 

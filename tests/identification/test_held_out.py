@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dynakin
+from dynakin.filter.estimator import Estimator
 from dynakin.identification.held_out import with_subject
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate_squat
@@ -23,7 +24,7 @@ def parts() -> tuple[Recording, Recording]:
 @pytest.fixture(scope="module")
 def fitted(parts: tuple[Recording, Recording]) -> IdentifyingTrial:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    setup = Setup(dynakin.load_model("sagittal7", subject, markers="opencap"))
+    setup = Setup(Estimator(dynakin.load_model("sagittal7", subject, markers="opencap")))
     return identify_on(parts[0], setup, same_recording=True)
 
 

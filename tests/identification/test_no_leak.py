@@ -67,8 +67,8 @@ def test_a_half_is_foretold_without_its_plates(
     for name, values in before[judging].items():
         np.testing.assert_array_equal(after[judging][name], values, err_msg=name)
         others = [k for k in range(4) if k != judging]
-        told = any(not np.array_equal(after[k][name], before[k][name]) for k in others)
-        assert told == name.startswith("bodies")  # the table asks nobody
+        differs = any(not np.array_equal(after[k][name], before[k][name]) for k in others)
+        assert differs == name.startswith("bodies")  # the table asks nobody
         # another verdict, of the band that it is on
         judged = [
             part.full_band() if name.endswith("full band") else part for part in (changed[judging], parts[judging])

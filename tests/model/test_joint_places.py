@@ -158,7 +158,7 @@ def test_the_movement_finds_how_far_the_knee_rolls() -> None:
     found = squat_with(knee_roll=0.012)
     (roll,) = (parameter for parameter in found.parameters if parameter.name == "length/knee_roll")
     assert roll.value == pytest.approx(0.012, abs=0.003) and not roll.at_bound
-    assert "knee roll" not in told_of_bounds(found).text
+    assert "knee roll" not in finding_on_bounds(found).text
 
 
 def test_the_outer_end_of_a_knees_axis_may_lie_farther_forward_on_each_side_for_itself() -> None:
@@ -191,9 +191,9 @@ def test_a_knee_that_rolls_as_none_does_stops_at_the_bound_and_is_told(roll_m: f
     found = squat_with(knee_roll=roll_m)
     (roll,) = (parameter for parameter in found.parameters if parameter.name == "length/knee_roll")
     assert roll.at_bound and roll.value == pytest.approx(bound_m, abs=0.0005)
-    told = told_of_bounds(found)
-    assert told.level == "warning" and re.search(r"lengths\): .*\bknee roll\b", told.text)
-    assert "knee roll length" not in told.text and "mass" not in told.advice
+    finding = finding_on_bounds(found)
+    assert finding.level == "warning" and re.search(r"lengths\): .*\bknee roll\b", finding.text)
+    assert "knee roll length" not in finding.text and "mass" not in finding.advice
 
 
 def test_an_amount_that_the_last_frame_moved_off_its_bound_a_little_is_on_it() -> None:
@@ -217,7 +217,7 @@ def test_amounts_have_units_of_their_own() -> None:
     assert shown_unit("kg m2") == (1.0, "kg m²")
 
 
-def told_of_bounds(found: Estimate) -> Insight:
+def finding_on_bounds(found: Estimate) -> Insight:
     return next(each for each in insights(found, compute_metrics(found)) if each.title == "Bounds")
 
 

@@ -13,8 +13,9 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError
+from dynakin.filter.error_sizes import LANDMARKS, ONE_SIDED, UNMARKED, less_sure_joints, usual_sizes
 from dynakin.filter.estimator import Tracked
-from dynakin.filter.systematic import LANDMARKS, ONE_SIDED, UNMARKED, Systematic, less_sure_joints, usual_sizes
+from dynakin.filter.systematic import Systematic
 from dynakin.model.definition import load_model
 from dynakin.recordings.recording import Recording
 from dynakin.report.insights import insights

@@ -12,7 +12,7 @@ import dynakin
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, ModelError, RecordingError
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.calibration.loads import with_loads
+from dynakin.model.calibration.declared import with_loads
 from dynakin.model.definition import ModelDefinition
 from dynakin.pipeline.stages import configure
 from dynakin.recordings.plates.loads import without_plate_loads

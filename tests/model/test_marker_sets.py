@@ -1,4 +1,4 @@
-"""Every built-in marker set on a simulated person who wears all of it: found by name, measured, the posture told."""
+"""Every built-in marker set on a simulated person who wears all of it: found by name, measured, its posture found."""
 
 from __future__ import annotations
 
@@ -186,8 +186,8 @@ def test_the_device_without_a_knee_marker_sets_the_knees_axis(person: SimulatedT
 
 def test_joint_widths_of_the_recording_come_before_those_of_the_height(person: SimulatedTrial) -> None:
     plain = wearing(person, "plug-in-gait")
-    told = {"knee_width_m_r": 0.120, "knee_width_m_l": 0.120, "ankle_width_m_r": 0.080}
-    initial = measured(replace(plain, subject=told), "plug-in-gait")
+    given = {"knee_width_m_r": 0.120, "knee_width_m_l": 0.120, "ankle_width_m_r": 0.080}
+    initial = measured(replace(plain, subject=given), "plug-in-gait")
     assert any("right knee 120 mm" in said and "right ankle 80 mm" in said for said in initial.messages)
     core = _core.Model(initial.spec)
     _, origins = _core.segment_poses(core, core.initial_state())

@@ -63,7 +63,7 @@ def test_coordinates_that_are_fixed_stay() -> None:
 
 
 def test_a_pose_that_a_joint_cannot_meet_is_met_in_the_plane() -> None:
-    """A root that slides and turns in the plane, told of a turn out of it: its origin stays, and the turn is that of
+    """A root that slides and turns in the plane, given a turn out of it: its origin stays, and the turn is that of
     least squares alone, as where it cannot slide."""
     axes = (
         Axis(coordinate="x", kind="translation", direction=(1, 0, 0)),

@@ -128,9 +128,9 @@ def test_a_user_knows_better_and_a_load_where_nobody_stands_is_said() -> None:
     loads = foot_loads(walker({}, plates), LABORATORY, MARKERS)
     assert not loads.total_known.any()
     assert any(text.startswith("Warning: c carries up to 300 N") for text in loads.messages)
-    told = foot_loads(walker({}, plates), LABORATORY, MARKERS, assigned={"c": "right"})
-    assert told.total_known.all()
-    np.testing.assert_allclose(told.wrench[:, 0, 1], 600.0, rtol=1e-3)
+    assigned = foot_loads(walker({}, plates), LABORATORY, MARKERS, assigned={"c": "right"})
+    assert assigned.total_known.all()
+    np.testing.assert_allclose(assigned.wrench[:, 0, 1], 600.0, rtol=1e-3)
     with pytest.raises(ConfigError, match="'d' is not in walker; expected one of a, b, c"):
         foot_loads(walker({}, plates), LABORATORY, MARKERS, assigned={"d": "right"})
 

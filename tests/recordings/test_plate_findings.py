@@ -74,8 +74,8 @@ def test_a_plate_off_its_place_is_said_with_its_offset(x: float, z: float) -> No
     made = walked(moved=(x, z))
     said = [t for t in messages(made.recording) if "off its place" in t]
     assert len(said) == 1 and said[0].startswith("Warning: p1") and "left foot" in said[0]
-    told = [float(part.split()[0].rstrip(",")) for part in (said[0].split("(X ")[1], said[0].split("Z ")[1])]
-    np.testing.assert_allclose(told, [x, z], atol=0.03)
+    place = [float(part.split()[0].rstrip(",")) for part in (said[0].split("(X ")[1], said[0].split("Z ")[1])]
+    np.testing.assert_allclose(place, [x, z], atol=0.03)
     loads = foot_loads(made.recording, LABORATORY, FOOT_MARKERS)
     on = (made.push[:, 1] > 100.0) & (made.recording.time < 1.3)
     assert np.isnan(loads.wrench[on, 1]).all() or abs(z) < 0.2

@@ -47,17 +47,17 @@ def test_a_late_adaptation_is_noted_and_a_misfit_that_grows_is_a_warning(estimat
 def test_markers_that_move_too_far_are_named_without_their_prefix(estimate: Estimate) -> None:
     assert found(estimate)["Soft tissue"].level == "good"
     swing = 0.06 * np.sin(np.pi * estimate.time)
-    told = found(with_element(estimate, "marker/S1:RTHI/x", swing))["Soft tissue"]
-    assert told.level == "warning" and told.text.startswith("RTHI moves 60 mm on the thigh (usual 18 mm)")
-    assert told.advice
+    finding = found(with_element(estimate, "marker/S1:RTHI/x", swing))["Soft tissue"]
+    assert finding.level == "warning" and finding.text.startswith("RTHI moves 60 mm on the thigh (usual 18 mm)")
+    assert finding.advice
 
 
 def test_bounds_are_counted_by_kind_and_those_touched_for_a_time_are_told(estimate: Estimate) -> None:
     (shank,) = (p for p in estimate.parameters if p.name == "length/shank")
     path = np.where((estimate.time >= 4.0) & (estimate.time < 9.0), shank.upper, shank.initial)
-    told = found(with_element(estimate, "length/shank", path))["Bounds"].text
-    assert "(1 of 6 lengths, 0 of 20 marker places, 1 of 21 inertial numbers)" in told
-    assert "1 other touched a bound and left it (longest: shank length, 50 % of the time)" in told
+    finding = found(with_element(estimate, "length/shank", path))["Bounds"].text
+    assert "(1 of 6 lengths, 0 of 20 marker places, 1 of 21 inertial numbers)" in finding
+    assert "1 other touched a bound and left it (longest: shank length, 50 % of the time)" in finding
 
 
 def test_what_was_warned_of_is_a_finding_by_its_subject(estimate: Estimate) -> None:

@@ -29,9 +29,8 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.repetitions import Found, Repetition
 from dynakin.results.measures.sources import ABSENT, DERIVED, PRIOR, measured_moments
 from dynakin.validation.methods import Trial
-from support.estimates.played import unpacked
 from support.estimates.walking import make_walker
-from support.page import shown
+from support.page import shown, unpacked
 
 DERIVED_WORDS, PRIOR_WORDS = "derived from the motion", "prior: load sharing assumed"
 DASHED, DOTTED = 'stroke-dasharray="36 26"', 'stroke-dasharray="10 22"'

@@ -16,8 +16,8 @@ from dynakin.report.playback import playback
 from dynakin.report.styles import segment_colours
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.pressure import floor_height
-from support.estimates.played import unpacked
 from support.estimates.synthetic import make_estimate
+from support.page import unpacked
 
 
 @pytest.fixture(scope="module")

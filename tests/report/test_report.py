@@ -263,10 +263,10 @@ def test_one_sentence_says_what_to_look_at(estimate: Estimate) -> None:
 def test_what_the_recording_tells_is_shown_where_the_prior_is_known(html: str, estimate: Estimate) -> None:
     """Every constant once, with its standard deviation before and after; an estimate without priors has no section."""
     assert 'id="identifiability"' not in html
-    told = [replace(p, prior_sd=4.0 * p.sd) if p.estimated else p for p in estimate.parameters]
-    page = render_report(replace(estimate, parameters=told))
+    parameters = [replace(p, prior_sd=4.0 * p.sd) if p.estimated else p for p in estimate.parameters]
+    page = render_report(replace(estimate, parameters=parameters))
     section = page.split('id="identifiability"')[-1].split("</section>")[0]
-    lengths = sum(p.kind == "length" and p.estimated for p in told)
+    lengths = sum(p.kind == "length" and p.estimated for p in parameters)
     assert f"Lengths ({lengths}): {lengths} known from the data." in section
     assert "Moments of inertia" in section and "Movements that would help" not in section
 

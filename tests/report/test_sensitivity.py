@@ -1,4 +1,4 @@
-"""Figure 3 from a file: the grid that is read, what is drawn, and what a bad file is told."""
+"""Figure 3 from a file: the grid that is read, what is drawn, and the message for a bad file."""
 
 from __future__ import annotations
 

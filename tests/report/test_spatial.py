@@ -23,9 +23,8 @@ from dynakin.report.styles import SIDE_COLOURS, side_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import with_angles
 from dynakin.results.measures.metrics import compute_metrics
-from support.estimates.played import unpacked
 from support.estimates.spatial import MASS_KG, make_spatial
-from support.page import shown
+from support.page import shown, unpacked
 
 
 @pytest.fixture(scope="module")

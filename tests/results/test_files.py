@@ -87,14 +87,14 @@ def test_figures_recomputed_from_the_files_equal_metrics_json(folder: Path, esti
     every_axis = np.ones(
         3, dtype=bool
     )  # out of the plane nothing differs, so the laboratory distance is the planar one
-    for name, told in metrics["markers"]["rms_mm"].items():
+    for name, reported in metrics["markers"]["rms_mm"].items():
         measured = estimate.recording.marker(name)[window]
-        assert marker_rms_mm(measured, markers.marker(name)[window], every_axis) == pytest.approx(told, abs=1e-4)
+        assert marker_rms_mm(measured, markers.marker(name)[window], every_axis) == pytest.approx(reported, abs=1e-4)
     table = read_table(folder / "wrench.sto")
     columns = dict(zip(table.names, table.values.T, strict=True))
-    for component, told in metrics["wrench"]["rms"].items():
+    for component, reported in metrics["wrench"]["rms"].items():
         fit = signal_fit(columns[f"{component}_measured"][window], columns[f"{component}_estimated"][window])
-        assert fit.rms == pytest.approx(told, rel=1e-5)
+        assert fit.rms == pytest.approx(reported, rel=1e-5)
 
 
 @pytest.mark.parametrize("unit", ["m", "mm"])

@@ -13,6 +13,7 @@ import xarray as xr
 import dynakin
 from dynakin.cli.app import main
 from dynakin.errors import LostError
+from dynakin.filter.estimator import Estimator
 from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
@@ -132,7 +133,7 @@ def test_known_truth_what_is_flagged_is_what_is_wrong(squat: SimulatedTrial, lag
     error = np.abs(found.data["coordinates"].values - truth.transpose("time", "coordinate").values)
     assert np.nanmax(np.degrees(error)) < 25.0  # what is left is right
     with pytest.raises(LostError, match=r"EKF \(default\): the person was lost.*3\.00 to 4\.49 s"):
-        compare_trial(mislabelled, Setup(model, lag_s=lag_s))
+        compare_trial(mislabelled, Setup(Estimator(model), lag_s=lag_s))
 
 
 @pytest.mark.nightly

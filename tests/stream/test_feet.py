@@ -12,7 +12,7 @@ import dynakin
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.systematic import OWN_AT_ONCE
+from dynakin.filter.reported_sd import OWN_AT_ONCE
 from dynakin.model.markers.recognise import recognise
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import ON_PLATE, SHARED_PLATE, UNMEASURED
@@ -121,8 +121,8 @@ def test_pelvis_and_one_leg_are_followed_live(
     seen = np.isin(trial.recording.marker_names, shown)
     part = replace(trial.recording, markers=np.where(seen[:, None], trial.recording.markers, np.nan), plates=())
     live, frames, said = session(Replay(part, speed=0.0, duration_s=3.5), standing_s=1.0)
-    told = next(text for text in said if "are there" in text)
-    count, of = (int(word) for word in told.split() if word.isdigit())
+    counted = next(text for text in said if "are there" in text)
+    count, of = (int(word) for word in counted.split() if word.isdigit())
     assert 2 * count < of and "Ready: move." in said
 
     def knee(frames: list[LiveFrame], live: Live) -> np.ndarray:
@@ -157,8 +157,8 @@ def test_smoothed_moments_and_bands_are_those_with_the_feet(
     smoothed = np.stack([f.smoothed.moments[knees] for f in frames[LAG:] if f.smoothed is not None])
     assert np.abs(now[50:]).max() > 30.0
     assert np.sqrt(np.mean((now - smoothed)[50:] ** 2)) < 5.0
-    told = [f.deviations["moments"][knees] for f in frames if f.deviations is not None]
-    assert told and np.all(np.array(told) > 0.0)
+    deviations = [f.deviations["moments"][knees] for f in frames if f.deviations is not None]
+    assert deviations and np.all(np.array(deviations) > 0.0)
     model, x, P = live.tracker.core_model, live.tracker.state, live.tracker.covariance
     loads = live.tracker._stepped[-1].loads
     assert loads is not None

@@ -1,4 +1,4 @@
-"""Missing samples are told from jitter."""
+"""Missing samples are no jitter."""
 
 from __future__ import annotations
 

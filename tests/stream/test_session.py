@@ -298,8 +298,8 @@ def test_silent_markers_are_told_with_what_happens_then(squat: Recording) -> Non
     for holds, what in ((True, "the motion is held until they are back"), (False, "the estimate waits for them")):
         monitor = Monitor(live.tracker.calibrated, 100.0, plates=False, used=False, holds=holds)  # type: ignore[arg-type]
         monitor.last = replace(monitor.last, tracking="following")
-        told = monitor.changes(Fusion(live.fusion.markers, None), 1e9)
-        assert told == [f"The markers are silent; {what}."]
+        found = monitor.changes(Fusion(live.fusion.markers, None), 1e9)
+        assert found == [f"The markers are silent; {what}."]
         assert monitor.last.tracking == ("lost" if holds else "following")
 
 
@@ -307,8 +307,8 @@ def test_a_movement_weighs_a_person_only_where_it_is_long_and_steady(monkeypatch
     """As `find_mass` has it of files; a step off the plates went into the mass, by half of it, before."""
     squats = replace(simulate_squat(seed=1, duration_s=12.0).recording.window(3.0, 12.0), subject={})
     monkeypatch.setattr(start, "standing_window", lambda recording: None)  # between the squats they do stand
-    told = quietest(squats)
-    assert told[0].subject["mass_kg"] == pytest.approx(70.0, abs=2.0) and "mean load" in told[2]
+    found = quietest(squats)
+    assert found[0].subject["mass_kg"] == pytest.approx(70.0, abs=2.0) and "mean load" in found[2]
     beside = np.where(squats.time < 7.0, 1.0, 0.3)[:, None]
     uneven = squats.with_plates(
         tuple(replace(p, force=p.force * beside, moment=p.moment * beside) for p in squats.plates)

@@ -100,7 +100,7 @@ def test_the_page_is_served_to_this_machine_and_ends_with_the_session(
 
 
 def connects(url: str, origin: str | None, host: str | None = None) -> bool:
-    """Whether a websocket is opened and something is told on it."""
+    """Whether a websocket is opened and something is sent on it."""
     from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
     from websockets.typing import Origin, Subprotocol

@@ -1,4 +1,4 @@
-"""Two feet that step where they are told to, over plates that carry what they are told to: all is known."""
+"""Two feet that step where they are to, over plates that carry what they are to: all is known."""
 
 from __future__ import annotations
 

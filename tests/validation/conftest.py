@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 import dynakin
+from dynakin.filter.estimator import Estimator
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.methods import Trial, compare_trial
@@ -19,7 +20,7 @@ def simulated() -> SimulatedTrial:
 @pytest.fixture(scope="session")
 def setup() -> Setup:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    return Setup(dynakin.load_model("sagittal7", subject, markers="opencap"))
+    return Setup(Estimator(dynakin.load_model("sagittal7", subject, markers="opencap")))
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,6 @@ from dynakin.simulation.trial import simulate
 from dynakin.studies.tuning.trial import prepare
 from dynakin.units import COMPONENTS
 from dynakin.validation.held_out import Blind, judge, measured_wrench
-from dynakin.validation.setup import Setup
 from dynakin.validation.unseen import _Trial
 
 WRONG = 1e6
@@ -29,7 +28,7 @@ def walk() -> Recording:
 @pytest.fixture(scope="module")
 def estimator() -> Estimator:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    return Setup(dynakin.load_model("fullbody", subject)).estimator("default")
+    return Estimator(dynakin.load_model("fullbody", subject))
 
 
 @pytest.fixture(scope="module")
@@ -55,10 +54,10 @@ def test_one_mask_feeds_and_judges(
 
 def test_frames_beside_the_plates_are_not_judged(walk: Recording, initial: CalibratedModel, known: np.ndarray) -> None:
     """A prediction that is right where the total is known, and absurd elsewhere, has no error."""
-    told = initial.ground.wrench_to_ground(walk.total_wrench())
-    told[~known] = WRONG
-    rows = judge(Blind(walk, initial, {"told": told}, ()), walk)
+    wrench = initial.ground.wrench_to_ground(walk.total_wrench())
+    wrench[~known] = WRONG
+    rows = judge(Blind(walk, initial, {"right where known": wrench}, ()), walk)
     assert {row.quantity for row in rows} == set(COMPONENTS)
     assert all(row.rms.mean == 0.0 for row in rows)
     trial = _Trial(walk, initial, np.empty((walk.n_frames, 0, 3)), measured_wrench(walk, initial))
-    assert set(trial.wrench_errors("", "told", told).values()) == {0.0}
+    assert set(trial.wrench_errors("", "right where known", wrench).values()) == {0.0}

@@ -12,6 +12,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError, OutputError
+from dynakin.filter.estimator import Estimator
 from dynakin.report.text_tables import table2_text
 from dynakin.results.measures.fit import SignalFit
 from dynakin.results.measures.metrics import compute_metrics
@@ -120,9 +121,9 @@ def test_a_row_over_fewer_trials_says_so_and_forces_that_are_doubted_are_marked(
 def test_settings_that_make_no_sense_are_refused() -> None:
     model = dynakin.load_model("sagittal7")
     with pytest.raises(ConfigError, match="no preset"):
-        Setup(model, {})
+        Setup(Estimator(model), {})
     with pytest.raises(ConfigError, match="0 Hz"):
-        Setup(model, cutoff_hz=0.0)
+        Setup(Estimator(model), cutoff_hz=0.0)
 
 
 def test_squats1_filter_follows_the_plates_far_below_the_table(data_dir: Path) -> None:
@@ -130,7 +131,8 @@ def test_squats1_filter_follows_the_plates_far_below_the_table(data_dir: Path) -
     recording = dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
     model = dynakin.load_model("sagittal7", dynakin.Subject(mass_kg=60.05), markers="opencap")
     rows = {
-        (row.quantity, row.method): row.rms.mean for row in table2([compare_trial(recording, Setup(model, lag_s=0.0))])
+        (row.quantity, row.method): row.rms.mean
+        for row in table2([compare_trial(recording, Setup(Estimator(model), lag_s=0.0))])
     }
     limits = {"fx": (6.0, 15.0, 30.0), "fy": (10.0, 20.0, 45.0), "mz": (7.0, 15.0, 30.0)}
     for component, (ekf, least, most) in limits.items():

@@ -28,7 +28,7 @@ def initial(simulated: SimulatedTrial, setup: Setup) -> dynakin.CalibratedModel:
 
 def test_a_comparison_starts_from_the_identified_subject(setup: Setup) -> None:
     subject = IdentifiedSubject.model_construct(use="table")
-    assert replace(setup, parameters=subject).estimator("default").parameters is subject
+    assert replace(setup, common=replace(setup.common, parameters=subject)).estimator("default").parameters is subject
 
 
 def test_nothing_is_filtered_again(compared: Trial, initial: dynakin.CalibratedModel, setup: Setup) -> None:

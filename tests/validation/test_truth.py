@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 import dynakin
+from dynakin.filter.estimator import Estimator
 from dynakin.report.text_tables import truth_text
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from dynakin.simulation.trial import simulate_squat
@@ -76,7 +77,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Trial:
     made = simulate_squat(seed=2, duration_s=5.0, mass_kg=70.0)
     made.save(folder)
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    setup = Setup(dynakin.load_model("sagittal7", subject, markers="opencap"), lag_s=0.0)
+    setup = Setup(Estimator(dynakin.load_model("sagittal7", subject, markers="opencap")), lag_s=0.0)
     return compare_trial(replace(made.recording, path=str(folder / "markers.trc")), setup)
 
 

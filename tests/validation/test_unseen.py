@@ -12,10 +12,9 @@ from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate_squat
-from dynakin.validation.extrapolation import extrapolated, held, line, persisted
 from dynakin.validation.setup import Setup
 from dynakin.validation.unseen import unseen, unseen_figures
-from dynakin.validation.yardsticks import Figures
+from dynakin.validation.yardsticks import Figures, extrapolated, held, line, persisted
 
 
 def test_a_straight_line_is_extrapolated_exactly_and_persistence_lags_by_the_span() -> None:

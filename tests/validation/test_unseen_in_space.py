@@ -10,6 +10,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError
+from dynakin.filter.estimator import Estimator
 from dynakin.simulation.output import SimulatedTrial, save_trial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
@@ -30,7 +31,7 @@ def walk() -> SimulatedTrial:
 @pytest.fixture(scope="module")
 def setup() -> Setup:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    return Setup(dynakin.load_model("fullbody", subject), lag_s=0.0)
+    return Setup(Estimator(dynakin.load_model("fullbody", subject)), lag_s=0.0)
 
 
 @pytest.fixture(scope="module")

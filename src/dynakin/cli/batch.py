@@ -44,8 +44,7 @@ def batch(
         from dynakin.studies.batch.dataset import check_presets, read_dataset
         from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
         from dynakin.studies.batch.subjects import identify_subjects, with_parameters
-        from dynakin.studies.engine.folder import ROWS, open_folder
-        from dynakin.studies.engine.journal import Journal
+        from dynakin.studies.engine.journal import ROWS, Journal, open_folder
         from dynakin.studies.engine.pools import open_pool
 
     if backend == "threads":

@@ -37,7 +37,8 @@ def rehearsed(case: Case) -> tuple[Prepared | None, DynakinError | None]:
         refusal = error
     if case.config.mass_kg is None and isinstance(refusal, ModelError) and refusal.message.startswith("mass_kg"):
         somebody = case.config.changed(mass_kg=_SOME_KG).subject()
-        setup = replace(case.setup, definition=case.setup.definition.with_subject(somebody))
+        common = replace(case.setup.common, model=case.setup.definition.with_subject(somebody))
+        setup = replace(case.setup, common=common)
         try:
             return next(iter(prepare_case(replace(case, setup=setup)).values())), refusal
         except DynakinError:

@@ -15,6 +15,7 @@ from dynakin.filter.prepared import Prepared
 from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.feet.loads import MEASURED, REASONS, SHARED, SWING, FootLoads
 from dynakin.results.naming import listed, plural
+from dynakin.results.records import WARNING
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import Case
 
@@ -42,7 +43,7 @@ def print_rows(console: Console, rows: Iterable[tuple[str, str]]) -> None:
     grid.add_column(overflow="fold")
     before = ""
     for topic, text in rows:
-        grid.add_row("" if topic == before else topic, Text(text, style="yellow" if text.startswith("Warning") else ""))
+        grid.add_row("" if topic == before else topic, Text(text, style="yellow" if text.startswith(WARNING) else ""))
         before = topic or before
     console.print(grid)
 

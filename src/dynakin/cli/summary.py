@@ -18,7 +18,7 @@ from dynakin.results.measures.bounds import counts_in_words
 from dynakin.results.measures.sources import MEANINGS, UNKNOWN
 from dynakin.results.measures.tracking import why_lost
 from dynakin.results.naming import listed, sentence
-from dynakin.results.records import NOT_SMOOTHED, doubts_mass
+from dynakin.results.records import IN_STEP, NOT_SMOOTHED, WARNING, doubts_mass, warnings_of
 from dynakin.settings.lag import in_words
 
 
@@ -31,14 +31,14 @@ def print_summary(result: Result, folder: Path) -> None:
         console.print(f"  {_contact_in_words(name, found)}", style="dim")
     warnings = [
         message
-        for message in estimate.messages
-        if message.startswith("Warning:") and sentence(message.removeprefix("Warning: ")) not in moments["reasons"]
+        for message in warnings_of(estimate.messages)
+        if sentence(message.removeprefix(WARNING)) not in moments["reasons"]
     ]
     for message in sorted(warnings, key=lambda message: not doubts_mass(message)):
         console.print(message, style="yellow")
     console.print(_figures(estimate, metrics))
     for message in estimate.messages:
-        if message.startswith(NOT_SMOOTHED) or message.endswith("brought into step."):
+        if message.startswith(NOT_SMOOTHED) or message.endswith(IN_STEP):
             console.print(message)
     _print_verdict(console, insights(estimate, metrics))
     console.print(f"Results  {folder}", soft_wrap=True)

@@ -68,12 +68,11 @@ def grid(
     """
     from dynakin.cli.compare_inputs import cases_of
     from dynakin.report.paper_figures.figures import save_sensitivity_figures
-    from dynakin.studies.engine.folder import ROWS, open_folder
-    from dynakin.studies.engine.journal import Journal
+    from dynakin.studies.engine.journal import ROWS, Journal, open_folder
     from dynakin.studies.engine.pools import open_pool
     from dynakin.studies.tuning.grid import belongs_to, run_grid
+    from dynakin.studies.tuning.in_words import criteria_text, grid_text
     from dynakin.studies.tuning.output import write_grid
-    from dynakin.studies.tuning.tables import criteria_text, grid_text
 
     preset = given.pop("preset", None)
     cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune grid")
@@ -119,13 +118,11 @@ def fit(
     A run that was stopped goes on where it was when it is started again with the same folder.
     """
     from dynakin.cli.compare_inputs import cases_of
-    from dynakin.studies.engine.folder import ROWS, open_folder
-    from dynakin.studies.engine.journal import Journal
+    from dynakin.studies.engine.journal import ROWS, Journal, open_folder
     from dynakin.studies.engine.pools import open_pool
-    from dynakin.studies.tuning.advice import recommendation
     from dynakin.studies.tuning.fit import Fitter, belongs_to_fit, usual_names
+    from dynakin.studies.tuning.in_words import figures_text, recommendation, settings_text
     from dynakin.studies.tuning.output import write_fit
-    from dynakin.studies.tuning.tables import figures_text, settings_text
 
     preset = given.pop("preset", None)
     cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune fit")

@@ -14,6 +14,7 @@ from dynakin.filter.samples import in_step
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
+from dynakin.results.records import IN_STEP
 
 Array = npt.NDArray[np.float64]
 
@@ -93,7 +94,7 @@ def in_words(shift_s: float, delay: tuple[float, float] | None) -> list[str]:
     total, sd = shift_s + delay[0], delay[1]
     ahead = "behind" if total >= 0.0 else "ahead of"
     text = f"The plates are {1000.0 * abs(total):.1f} ms {ahead} the markers (standard deviation {1000.0 * sd:.1f} ms)"
-    return [f"{text}; they were brought into step." if shift_s else f"{text}."]
+    return [f"{text}; {IN_STEP}" if shift_s else f"{text}."]
 
 
 def contradicted(delay_s: float, misfit_n: float, misfit_then_n: float) -> str:

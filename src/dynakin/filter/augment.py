@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms
 from dynakin.bindings import _core
 from dynakin.filter.noise import jerk_densities, joint_groups, plate_sd, soft_tissue_sd, soft_tissue_time_s
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -74,7 +75,7 @@ def _place_sd(initial: CalibratedModel, first: dict[str, int]) -> Array:
     for k, marker in enumerate(initial.spec.markers):
         places = [first[name] for axis in "xyz" if (name := f"marker/{marker.name}/{axis}") in first]
         if places:
-            found[k] = np.sqrt(np.mean(initial.sd0[places] ** 2))
+            found[k] = rms(initial.sd0[places])
     return found
 
 
@@ -108,8 +109,9 @@ def variance_scales(names: Collection[str], noise: Noise) -> Array:
 
 
 def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
-    """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it. That of
-    the motion is not scaled: it is how fast people move when a recording begins, however well the sensors measure."""
+    """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it. Those
+    of speeds and accelerations are not scaled: people move as fast when a recording begins, however well it is measured.
+    """
     root = np.sqrt(variance_scales(initial.names, noise))
     root[[name.endswith(("/speed", "/acceleration")) for name in initial.names]] = 1.0
     scales: Array = np.outer(root, root)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import ModelDefinition, load_model
-from dynakin.model.identified import IdentifiedSubject, read_identified
+from dynakin.model.identified import read_identified
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.settings.effect import check_noise
 from dynakin.settings.settings import Settings
@@ -24,15 +24,6 @@ def definition_of(settings: Settings) -> ModelDefinition | OpenSimDefinition:
         settings.opensim,
         settings.functional,
     )
-
-
-def identified_of(settings: Settings) -> IdentifiedSubject | None:
-    """The identified subject that the settings name.
-
-    Raises:
-        ModelError: as `read_identified`.
-    """
-    return None if settings.parameters is None else read_identified(settings.parameters)
 
 
 def estimator_of(settings: Settings) -> Estimator:
@@ -55,5 +46,5 @@ def estimator_of(settings: Settings) -> Estimator:
         plates=settings.plates,
         contacts=settings.contacts,
         loads=settings.loads,
-        parameters=identified_of(settings),
+        parameters=None if settings.parameters is None else read_identified(settings.parameters),
     )

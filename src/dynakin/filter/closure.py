@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs, widened
+from dynakin.arrays import rms_length, runs, widened
 from dynakin.filter.mass_centre import mass_centre
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import rate_of
@@ -128,7 +128,7 @@ def plates_misfit(initial: CalibratedModel, time: Array, markers: Array, wrench:
     found = closure(initial, time, markers, wrench, np.ones(len(time), dtype=bool))
     if found is None:
         return None
-    return float(np.sqrt(np.nanmean(np.sum(found.excess**2, axis=1))))
+    return float(rms_length(found.excess))
 
 
 def _load_ratio(need: Array, have: Array, judged: Flags, weight: float, window: int) -> float | None:

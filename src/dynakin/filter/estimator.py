@@ -22,8 +22,7 @@ from dynakin.filter.skin import following_skin, may_follow
 from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
 from dynakin.filter.tracker import Tracker, known_lag
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.calibration.contacts import with_contacts
-from dynakin.model.calibration.loads import with_loads
+from dynakin.model.calibration.declared import with_contacts, with_loads
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject, with_identified
 from dynakin.progress import Progress

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from dynakin.arrays import filled
+from dynakin.arrays import filled, mean_seen
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
@@ -260,10 +260,8 @@ def marked_segments(initial: CalibratedModel) -> dict[str, list[int]]:
 
 def _middle(places: Array) -> Array:
     """(T, 3) m of points (T, K, 3)."""
-    seen: Flags = np.asarray(np.isfinite(places).all(axis=2))
-    with np.errstate(invalid="ignore"):
-        path = np.where(seen[..., None], places, 0.0).sum(axis=1) / seen.sum(axis=1, keepdims=True)
-    known = np.flatnonzero(seen.any(axis=1))
+    path = mean_seen(places, axis=1)
+    known = np.flatnonzero(np.isfinite(path).all(axis=1))
     if not len(known):
         return np.zeros_like(path)
     return np.stack([np.interp(np.arange(len(path)), known, path[known, axis]) for axis in range(3)], axis=1)

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import rms, runs
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
@@ -161,4 +161,4 @@ class CentreWeights:
         weights = np.linalg.solve(A.T @ A + ridge, A.T @ b)
         weights = weights - weights.mean() + 1.0 / len(use)
         left = np.einsum("m,sma->sa", weights, places) - self._centre
-        return np.asarray(weights) if np.sqrt(np.mean(left**2)) < self._worst_m else None
+        return np.asarray(weights) if rms(left) < self._worst_m else None

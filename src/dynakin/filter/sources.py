@@ -12,6 +12,7 @@ from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NO_CONTACT
+from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, contact_sources
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def with_sources(
     parents = data["joint_parent"].values
     moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
     if feet is None:
-        blind = np.isnan(data["wrench_measured"].transpose("time", "component").values).all(axis=1)
+        blind = np.isnan(values_of(data, "wrench_measured")).all(axis=1)
         joints = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(segments)))
         moments = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
@@ -61,7 +62,7 @@ def with_sources(
         found |= {name: data[name].where(there) for name in ("foot_wrench", "foot_wrench_sd") if name in data}
         joints = _behind(contacts, [segments.index(name) for name in feet.segments], parents)
         legs = _below_the_thighs([segments.index(name) for name in soles], parents)
-        moments = data["moment_source"].transpose("time", "coordinate").values.copy()
+        moments = values_of(data, "moment_source").copy()
     joints[np.ix_(undeclared, ~legs)] = ABSENT
     if feet is not None:
         joints[_beyond(feet, soles, segments, parents)] = ABSENT

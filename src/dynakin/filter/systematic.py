@@ -8,20 +8,22 @@ afterwards and added to the filter's own variances ([derivations](derivations.md
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
-from dynakin.filter.joint_errors import JointErrors, Kind, floats
+from dynakin.filter.error_sizes import KINDS, OF_JOINTS, Sizes, less_sure_joints, usual_sizes
+from dynakin.filter.joint_errors import JointErrors, floats
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
+from dynakin.filter.reported_sd import BLOCKS, Parts, movement_intensity, reported
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import UNMEASURED
-from dynakin.results.measures.sources import MEASURED, PRIOR, moment_sources
+from dynakin.results.estimate import values_of
+from dynakin.results.measures.sources import moment_sources
 from dynakin.results.records import MISPLACED
 from dynakin.settings.noise import Noise
 
@@ -30,178 +32,9 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
-BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
-OF_JOINTS = get_args(Kind)
-KINDS = (*OF_JOINTS, "skin", "mass_centre")
-"""What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
-CENTRES = ("hinge_centre", "ball_centre")
-"""What goes by how far markers have moved, too."""
 MISFIT = 1.6
 """Times `Sizes.placed` from which a run says that a model was not scaled well: by truth 0.6 to 1.1 with the person's
 own skeleton, 2.5 to 3.2 with one scaled by hand."""
-
-
-Own = dict[str, tuple[float, float]]
-OWN_LATE: Own = {"coordinates": (1.0, 0.0), "accelerations": (0.12, 0.04), "moments": (0.25, 0.0)}
-"""Factor on the filter's own variance of a block where later frames helped: the first number, and the second times the
-`movement_intensity`. One density of jerk serves all movements: in theory half of a speed's variance is what such jerk
-leaves unseen, and five sixths of an acceleration's; a calm movement has none of it, an intense one more. Speeds have
-`SPEEDS_STILL` and `Sizes.own_speeds`."""
-SPEEDS_STILL = 0.25
-OWN_AT_ONCE: Own = {
-    "coordinates": (1.0, 0.0),
-    "speeds": (SPEEDS_STILL, 0.4),
-    "accelerations": (SPEEDS_STILL, 0.4),
-    "moments": (0.08, 0.17),
-}
-"""The same without later frames."""
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """Standard deviations of the errors, of each component; where they come from is in docs/derivations.md.
-
-    Attributes:
-        hinge_centre, ball_centre: m, of the centre of a joint with one or two axes (knee, ankle), with three (hip).
-        hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar) or
-            three.
-        root: rad, of the turn of the pelvis' frame in the pelvis.
-        skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
-        mass_centre: m, of the centre of mass of each segment off where the model has it.
-        placed: m, how far (mean) markers may be found from where the model has them, for centres of joints to be as
-            sure as said: of a model that was scaled worse to the person both are off, in proportion.
-        own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
-            intensity (`OWN_LATE`).
-        own_off_plates: part of the variance by the declared noise that counts at least, of late moments that are
-            measured in a recording in which some foot stands off the plates, or in a session in which one has: what
-            plates do not see they do not correct, and small innovations do not show it.
-        inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
-            `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
-    """
-
-    hinge_centre: float
-    ball_centre: float
-    hinge_axes: float
-    pair_axes: float
-    ball_axes: float
-    root: float
-    skin: float
-    mass_centre: float
-    placed: float
-    own_speeds: float
-    own_off_plates: float
-    inertia: bool = True
-
-    def scaled(self, factor: float) -> Sizes:
-        """The errors of joints, skin and centres of mass times a factor."""
-        return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
-
-    def late(self) -> Own:
-        """`OWN_LATE` with that of speeds."""
-        return OWN_LATE | {"speeds": (SPEEDS_STILL, self.own_speeds)}
-
-
-LANDMARKS = Sizes(
-    hinge_centre=0.0042,
-    ball_centre=0.005,
-    hinge_axes=np.radians(2.0),
-    pair_axes=np.radians(3.0),
-    ball_axes=np.radians(0.4),
-    root=np.radians(0.5),
-    skin=0.12,
-    mass_centre=0.02,
-    placed=np.inf,
-    own_speeds=0.17,
-    own_off_plates=0.14,
-)
-"""Joints that are found from markers on the skin."""
-UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
-"""Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
-(`docs/validation/geometry.md`)."""
-ONE_SIDED = 0.010 / LANDMARKS.hinge_centre
-"""Times as far off as others is the centre of a knee or ankle with a lateral marker alone and no width that somebody
-measured (`docs/validation/geometry.md`)."""
-SCALED = Sizes(
-    hinge_centre=0.0014,
-    ball_centre=0.0016,
-    hinge_axes=np.radians(1.3),
-    pair_axes=np.radians(1.3),
-    ball_axes=np.radians(0.8),
-    root=np.radians(0.9),
-    skin=0.08,
-    mass_centre=0.003,
-    placed=0.005,
-    own_speeds=0.06,
-    own_off_plates=0.034,
-    inertia=False,
-)
-"""Joints of a skeleton that was scaled to the person (.osim): as well as can be where markers lie within ``placed``."""
-
-
-def usual_sizes(calibrated: CalibratedModel) -> Sizes:
-    """By where the joints of a model come from."""
-    if calibrated.plan is None:
-        return SCALED
-    return UNMARKED if calibrated.unmarked_joints else LANDMARKS
-
-
-def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:
-    """Segment -> how many times as far off the centre of its joint may be as those of others."""
-    if calibrated.unmarked_joints:  # all are said to be as unsure
-        return {}
-    turns = {f"{joint[:-2]}_angle{joint[-2:]}" for joint in calibrated.one_sided_joints}  # knee_r: knee_angle_r
-    return {s.name: ONE_SIDED for s in calibrated.spec.segments if turns & {axis.coordinate for axis in s.axes}}
-
-
-def movement_intensity(acceleration: Array, sd: Array) -> Array:
-    """(...,) mean square of accelerations (..., K) over the filter's own deviations of them, of what moves."""
-    moves = sd > 0.0
-    ratio = np.divide(acceleration, sd, out=np.zeros_like(sd), where=moves)
-    return np.asarray(np.square(ratio).sum(axis=-1) / np.maximum(moves.sum(axis=-1), 1))
-
-
-Parts = dict[str, dict[str, Array]]
-
-
-def reported(
-    sizes: Sizes,
-    variance_scale: float,
-    own: Mapping[str, Array],
-    parts: Parts,
-    intensity: Array,
-    moved_m: Array,
-    sources: npt.NDArray[np.uint8] | None = None,
-    *,
-    off_plates: bool = False,
-    late: bool,
-) -> dict[str, Array]:
-    """Standard deviations that are reported: block -> (..., C).
-
-    Args:
-        variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
-            `Systematic.over_time`. intensity: (...,) as of `movement_intensity`. moved_m: (...,) as of
-            `Systematic.moved_m`. sources: (..., C) of the moments (`results.measures.sources`): the filter's own part
-            of what rests on a prior counts in full, because how a jerk is seen has no part in that. off_plates: whether
-            `Sizes.own_off_plates` counts. late: whether later frames helped.
-    """
-    factors = sizes.late() if late else OWN_AT_ONCE
-    farther = np.maximum(moved_m / sizes.placed, 1.0)[..., None]
-    found = {}
-    for block, sd in own.items():
-        still, moving = factors[block]
-        factor = still + moving * intensity[..., None]
-        if sources is not None and block == "moments":
-            measured = sizes.own_off_plates / variance_scale if late and off_plates else 0.0
-            least = np.select([sources == PRIOR, sources == MEASURED], [1.0, measured], 0.0)
-            factor = np.maximum(factor, least)
-        variance = factor * np.square(sd)
-        for kind in KINDS:
-            size = getattr(sizes, kind) * (farther if kind in CENTRES else 1.0)
-            variance = variance + size**2 * parts[kind][block]
-        if sizes.inertia:  # the filter's own part has so much of it already
-            variance = variance + np.maximum(1.0 - factor * variance_scale, 0.0) * parts["inertia"][block]
-        found[block] = np.sqrt(variance)
-    return found
 
 
 SKIN_ANGLE_RAD = np.radians(50.0)
@@ -361,11 +194,11 @@ class Systematic:
         time = np.asarray(data["time"].values)
         states = states_of(data)
         # how inertia hangs together is known at the end alone, how well it is known in each frame
-        sd = data["state_sd"].transpose("time", "element").values[:, self._inertia]
+        sd = values_of(data, "state_sd")[:, self._inertia]
         together = _correlation(data["final_covariance"].values[np.ix_(self._inertia, self._inertia)])
         wrench, segments = np.zeros((len(time), 0, 6)), []
         if "foot_wrench" in data:
-            wrench = np.nan_to_num(data["foot_wrench"].transpose("time", "foot", "component").values)
+            wrench = np.nan_to_num(values_of(data, "foot_wrench"))
             segments = [str(name) for name in data["foot_segment"].values]
         chosen = _sampled(time)
         each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments) for k in chosen]
@@ -417,13 +250,12 @@ class Systematic:
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
-        order = ("time", "coordinate")
-        own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
+        own = {block: values_of(data, f"{block}_sd") for block in BLOCKS}
         moved = self.moved_m(states_of(data))
         found = self.over_time(data), self.intensity(data), moved, moment_sources(data)
         off_plates = any_off_plates(data, self._feet)
         sd = reported(self.sizes, self._variance_scale, own, *found, off_plates=off_plates, late=late)
-        return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
+        return data.assign({f"{block}_sd": (("time", "coordinate"), sd[block]) for block in BLOCKS})
 
     def moved_m(self, x: Array) -> Array:
         """(...,) how far markers are found from where the model has them by states (..., n), mean; 0 where none is
@@ -447,13 +279,13 @@ class Systematic:
         """(T,) `movement_intensity` of a recording, by its states and the filter's own ``accelerations_sd``."""
         K = len(self._free)
         states = states_of(data)
-        sd = data["accelerations_sd"].transpose("time", "coordinate").values[:, self._free]
+        sd = values_of(data, "accelerations_sd")[:, self._free]
         return movement_intensity(states[:, 2 * K : 3 * K], sd)
 
 
 def states_of(data: xr.Dataset) -> Array:
     """(T, n) of a recording."""
-    return np.asarray(data["state"].transpose("time", "element").values)
+    return values_of(data, "state")
 
 
 def any_off_plates(data: xr.Dataset, feet: int) -> bool:
@@ -462,7 +294,7 @@ def any_off_plates(data: xr.Dataset, feet: int) -> bool:
     Args:
         feet: how many of the contacts are feet: the first ones, declared ones follow.
     """
-    return "foot_contact" in data and stands_off_plates(data["foot_contact"].transpose("time", "foot").values, feet)
+    return "foot_contact" in data and stands_off_plates(values_of(data, "foot_contact"), feet)
 
 
 def stands_off_plates(contact: npt.NDArray[np.uint8], feet: int) -> bool:

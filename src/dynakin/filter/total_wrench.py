@@ -25,6 +25,7 @@ from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
+from dynakin.results.records import IN_STEP
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -260,7 +261,7 @@ def _brought_into_step(
     there = brought_into_step(recording, delay_s)
     wrench = initial.ground.wrench_to_ground(there.total_wrench())
     ground, known = known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
-    text = f"{out_of_step_in_words(delay_s)}; they were brought into step."
+    text = f"{out_of_step_in_words(delay_s)}; {IN_STEP}"
     return replace(ground, notes=(text, *ground.notes)), known
 
 

@@ -11,7 +11,7 @@ from dynakin.errors import RecordingError
 from dynakin.filter.samples import recording_arrays
 from dynakin.filter.tracker import can_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.calibration.loads import with_loads
+from dynakin.model.calibration.declared import with_loads
 from dynakin.model.schema import kinds_of
 from dynakin.model.spec import free_names
 from dynakin.recordings.recording import Recording
@@ -61,7 +61,7 @@ def standing_zero(estimator: Estimator, estimate: Estimate, static: Recording | 
             "(zero = 'standing'), there or in a trial of its own (--static)"
         )
     if static is None and estimate.smoothed:
-        coordinates = estimate.data["coordinates"].transpose("time", "coordinate").values[window]
+        coordinates = estimate.values("coordinates")[window]
         return mean_angles(estimate.coordinate_names, estimate.is_rotation(), coordinates)
     return _estimated_anew(estimator, estimate, standing, window)
 

@@ -16,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
+from dynakin.arrays import rms, wrench_about
 from dynakin.errors import RecordingError
-from dynakin.identification.trials import Common, MeasuredTrial, about
+from dynakin.identification.trials import Common, MeasuredTrial
 from dynakin.identification.unknowns import Unknowns
 
 Array = npt.NDArray[np.float64]
@@ -112,7 +113,7 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
         for k, (columns, target) in enumerate(stacked):
             left = target - columns @ x
             if len(left):
-                sigma[k] = np.maximum(np.sqrt((left**2).mean(axis=0)), LEAST_SIGMA)
+                sigma[k] = np.maximum(rms(left, axis=0), LEAST_SIGMA)
                 tau[k] = [max(least[k], integrated_autocorrelation(left[:, c])) for c in range(len(rows))]
     theta[free] = x[:count]
     covariance = np.zeros((len(theta), len(theta)))
@@ -141,12 +142,14 @@ def wrench_rows(
     states, rows = trial.movement.states, common.rows
     if len(frames) == 0:
         return np.zeros((0, len(rows), len(theta) + len(rows) + 1)), np.zeros((0, len(rows)))
-    predicted = about(unknowns.wrench(common.core, states, theta), trial.reference)[:, rows]
+    predicted = wrench_about(unknowns.wrench(common.core, states, theta), trial.reference)[:, rows]
     slope = np.gradient(predicted, trial.movement.time, axis=0)[frames]
     J = unknowns.jacobian(common.core, states[frames], theta)
-    J = about(J.swapaxes(1, 2), trial.reference).swapaxes(1, 2)[:, rows]
+    J = wrench_about(J.swapaxes(1, 2), trial.reference).swapaxes(1, 2)[:, rows]
     own = np.concatenate([np.tile(np.eye(len(rows)), (len(frames), 1, 1)), -slope[:, :, None]], axis=2)
-    return np.concatenate([J, own], axis=2), about(trial.wrench[frames], trial.reference)[:, rows] - predicted[frames]
+    return np.concatenate([J, own], axis=2), wrench_about(trial.wrench[frames], trial.reference)[:, rows] - predicted[
+        frames
+    ]
 
 
 _WINDOW = 5.0

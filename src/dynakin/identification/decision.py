@@ -14,8 +14,9 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms, wrench_about
 from dynakin.identification.batch import SHORTEST_S, Posterior, at_start, identify_batch, known_s
-from dynakin.identification.trials import Common, MeasuredTrial, about, middle_of
+from dynakin.identification.trials import Common, MeasuredTrial, middle_of
 from dynakin.identification.unknowns import Unknowns
 from dynakin.progress import Progress
 from dynakin.units import COMPONENTS
@@ -63,7 +64,7 @@ class Decision:
 
     def in_words(self) -> list[str]:
         """Sentences."""
-        found = {use: np.sqrt((self.rms[use] ** 2).mean(axis=0)) for use in USES}
+        found = {use: rms(self.rms[use], axis=0) for use in USES}
         said = [
             "Each left out in turn and predicted from its markers alone by the others' posterior: "
             f"{', '.join(self.folds)}."
@@ -125,9 +126,8 @@ def rms_of(common: Common, trial: MeasuredTrial, predicted: Array) -> Array:
     """(r,) RMS of a prediction (T, 6) against the plates, about the trial's reference point: the metric. NaN where the
     plates say nothing."""
     rows = common.rows
-    error = about(trial.wrench, trial.reference)[:, rows] - about(predicted, trial.reference)[:, rows]
-    error = error[np.isfinite(error).all(axis=1)]
-    return np.sqrt((error**2).mean(axis=0)) if len(error) else np.full(len(rows), np.nan)
+    error = wrench_about(trial.wrench, trial.reference)[:, rows] - wrench_about(predicted, trial.reference)[:, rows]
+    return rms(error[np.isfinite(error).all(axis=1)], axis=0)
 
 
 def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress | None = None) -> Decision:

@@ -256,11 +256,6 @@ def mean_centre_of_pressure(wrench: Array) -> Array:
     return np.asarray(np.array([force[5], 0.0, -force[3]]) / force[1])
 
 
-def about(wrench: Array, point: Array) -> Array:
-    """Wrenches (..., 6) about the ground origin, their moments about ``point`` instead."""
-    return np.concatenate([wrench[..., :3], wrench[..., 3:] - np.cross(point, wrench[..., :3])], axis=-1)
-
-
 def _low_passed(time: Array, wrench: Array, middle: int) -> Array:
     """Like the kinematics; each half on its own, for one half may have to predict the other. What is unknown stays
     unknown."""

@@ -10,12 +10,16 @@ from typing import Protocol
 
 import numpy as np
 
-from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.files import is_file
-from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior, first_centre_of_pressure
+from dynakin.model.calibration.calibrated import (
+    CalibratedModel,
+    JointPrior,
+    first_centre_of_pressure,
+    starting_state,
+)
 from dynakin.model.calibration.in_space import started
-from dynakin.model.calibration.measure import measure
+from dynakin.model.calibration.measure import Asked, measure
 from dynakin.model.markers.draft.draft import GUESSED
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
@@ -24,7 +28,7 @@ from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
 from dynakin.model.plan import ModelPlan
 from dynakin.model.schema import ModelFile
-from dynakin.model.spec import in_layout, to_core
+from dynakin.model.spec import to_core
 from dynakin.model.table import BodyTable, load_table
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.read import read
@@ -191,10 +195,11 @@ class ModelDefinition:
     ) -> CalibratedModel:
         """As ``Definition.calibrate``: lengths and marker places from the first (or standing) frames, inertia from the
         table, coordinates from landmarks and, in space, markers."""
-        plan, rest = measure(
-            self.model, self.subject, self.table, self.marker_set, recording, ground,
-            static=static, side=side, vertical=vertical, forward=forward, functional=self.functional,
+        asked = Asked(
+            self.model, self.subject, self.table, self.marker_set, self.functional,
+            recording, static, side, vertical, forward, ground,
         )  # fmt: skip
+        plan, rest = measure(asked)
         messages, speeds, held = list(rest.messages), dict[str, float](), rest.held
         if plan.model.sided:
             begun = started(plan, rest.trial, rest.unplaced, rest.still)
@@ -205,31 +210,19 @@ class ModelDefinition:
         unmarked_kg = sum(body.mass for name, body in plan.inertia.items() if name not in marked)
         held = _not_known(plan, held)
         spec = to_core(plan)
-        core = _core.Model(spec)
-        names = list(core.layout.names)
         priors = priors or Priors()
-        limits = plan.bounds(bounds or Bounds(), priors)
         together = plan.joint_prior(priors)
-        x0 = np.array(core.initial_state(), dtype=float)
-        for at, name in enumerate(names):
-            if name.endswith("/speed"):
-                x0[at] = speeds.get(name.removesuffix("/speed"), x0[at])
-        lower = in_layout(names, {name: pair[0] for name, pair in limits.items()}, -np.inf)
-        upper = in_layout(names, {name: pair[1] for name, pair in limits.items()}, np.inf)
-        outside = (x0 < lower) | (x0 > upper)
-        for k in np.flatnonzero(outside):
-            messages.append(
-                f"Start of {names[k]} ({x0[k]:.3f}) lies beyond its bounds {lower[k]:.3f} to {upper[k]:.3f}: "
-                "put on the bound."
-            )
+        state, said = starting_state(
+            spec,
+            bounds=plan.bounds(bounds or Bounds(), priors),
+            prior=plan.prior(priors),
+            table=plan.table_values(),
+            speeds=speeds,
+        )
+        messages += said
         return CalibratedModel(
             spec=spec,
-            names=tuple(names),
-            x0=np.clip(x0, lower, upper),
-            sd0=in_layout(names, plan.prior(priors), np.nan),
-            lower=lower,
-            upper=upper,
-            table=in_layout(names, plan.table_values(), np.nan),
+            **state._asdict(),
             marker_variance=np.array([site.variance for site in plan.sites]),
             soft_tissue_m=np.array([site.soft_tissue_m for site in plan.sites]),
             unmodelled_m=_MODEL_M if plan.model.sided else 0.0,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import cross
+from dynakin.arrays import cross, wrench_about
 from dynakin.errors import ConfigError
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.orientation import axis_vector, find_forward, find_vertical, horizontal, refuse_mirrored
@@ -92,8 +92,7 @@ class GroundFrame:
     def wrench_to_ground(self, wrench: Array) -> Array:
         """Wrenches (..., 6) [N, N m] about the laboratory origin, there, to those about the ground's origin,
         in ground."""
-        force, moment = wrench[..., :3], wrench[..., 3:]
-        moved = moment - cross(self.origin_L, force)
+        force, moved = np.split(wrench_about(wrench, self.origin_L), 2, axis=-1)
         return np.concatenate([self.vectors_to_ground(force), self.vectors_to_ground(moved)], axis=-1)
 
     def wrench_to_laboratory(self, wrench: Array) -> Array:

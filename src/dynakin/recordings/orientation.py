@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from dynakin.arrays import mean_seen
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.landmarks import FacingPairs, mean_position, plain_name, present_pairs
 from dynakin.recordings.recording import Array, Recording
@@ -295,16 +296,12 @@ def _seen_mean(recording: Recording, names: Sequence[str]) -> Array:
     """Mean (T, 3) m of those of some markers that are seen, NaN where none is."""
     if not names:
         return np.full((recording.n_frames, 3), np.nan)
-    places = np.stack([recording.marker(name) for name in names])
-    n = np.isfinite(places).all(axis=2).sum(axis=0)[:, None]
-    return np.where(n > 0, np.nansum(places, axis=0) / np.maximum(n, 1), np.nan)
+    return mean_seen(np.stack([recording.marker(name) for name in names]), axis=0)
 
 
 def _seen_difference(recording: Recording, pairs: Sequence[tuple[str, str]]) -> Array:
     """Mean (T, 3) m from the second to the first of the pairs that are seen whole, NaN where none is."""
-    apart = np.stack([recording.marker(one) - recording.marker(other) for one, other in pairs])
-    n = np.isfinite(apart).all(axis=2).sum(axis=0)[:, None]
-    return np.where(n > 0, np.nansum(apart, axis=0) / np.maximum(n, 1), np.nan)
+    return mean_seen(np.stack([recording.marker(one) - recording.marker(other) for one, other in pairs]), axis=0)
 
 
 def _middle(places: list[Array]) -> Array:

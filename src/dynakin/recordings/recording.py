@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import wrench_about
 from dynakin.errors import RecordingError
 from dynakin.recordings.limits import check_markers, check_wrench
 from dynakin.recordings.signals import AnalogChannel, Event
@@ -166,7 +167,7 @@ class Recording:
             raise RecordingError(f"{self.path or self.name}: no force plates in this recording")
         force = np.sum([plate.force for plate in self.plates], axis=0)
         moment = np.sum([plate.moment for plate in self.plates], axis=0)
-        return np.hstack([force, moment - np.cross(np.asarray(about, dtype=float), force)])
+        return wrench_about(np.hstack([force, moment]), np.asarray(about, dtype=float))
 
     def with_plates(self, plates: tuple[Plate, ...], notes: tuple[str, ...] = ()) -> Recording:
         """The same recording with these plates instead of its own, and with further notes."""

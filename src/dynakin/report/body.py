@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.report.labels import is_planar
-from dynakin.report.sides import values_of
 from dynakin.report.styles import SIDE_COLOURS, segment_colours, side_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import words
@@ -64,11 +63,11 @@ def chain_of(estimate: Estimate) -> Chain:
     if "joint_centres" not in estimate.data:
         return Chain(np.zeros((len(estimate.time), 0, 3)), ())
     data = estimate.data
-    points = [*np.moveaxis(values_of(estimate, "joint_centres"), 1, 0)]
+    points = [*np.moveaxis(estimate.values("joint_centres"), 1, 0)]
     parents = [int(parent) for parent in data["joint_parent"].values]
     segments = [str(name) for name in data["joint_segment"].values]
     bones = [Bone(p, j, segments[p]) for j, p in enumerate(parents) if p >= 0]
-    markers = np.where(estimate.modelled_axes(), values_of(estimate, "markers_estimated"), 0.0)
+    markers = np.where(estimate.modelled_axes(), estimate.values("markers_estimated"), 0.0)
     known = ~estimate.lost  # the others are empty
     carriers = estimate.marker_segments
     for joint, segment in enumerate(segments):

@@ -17,7 +17,7 @@ from markupsafe import Markup
 from dynakin.report.body import chain_of, painted
 from dynakin.report.labels import is_planar, short_marker_names
 from dynakin.report.plot import INK, MEASURED
-from dynakin.report.sides import Joint, joints_of, normalising_mass, values_of
+from dynakin.report.sides import Joint, joints_of, normalising_mass
 from dynakin.report.styles import SIDE_COLOURS
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.feet import foot_sources
@@ -80,7 +80,7 @@ def playback(estimate: Estimate) -> Playback:
     planar, mass = is_planar(estimate), normalising_mass(estimate)
     chain, joints = chain_of(estimate), joints_of(estimate)
     colours, key = painted(estimate, chain)
-    measured, estimated = (_seen(estimate, values_of(estimate, f"markers_{k}")) for k in ("measured", "estimated"))
+    measured, estimated = (_seen(estimate, estimate.values(f"markers_{k}")) for k in ("measured", "estimated"))
     points = _seen(estimate, chain.points)
     view, centre = _view(estimate, np.concatenate([points, measured, estimated], axis=1))
     arrays: dict[str, Array] = {
@@ -96,7 +96,7 @@ def playback(estimate: Estimate) -> Playback:
     heaviest = (estimate.mass_kg or 0.0) * GRAVITY_M_S2 or float(forces.max(initial=0.0)) or 1.0
     view["mm_per_newton"] = float(f"{0.5 * view['height'] / heaviest:.6g}")
     if "mass_centre" in estimate.data and not planar:
-        arrays["mass_centre"] = 1000.0 * values_of(estimate, "mass_centre")
+        arrays["mass_centre"] = 1000.0 * estimate.values("mass_centre")
     frames = _frames_shown(estimate, sum(array.shape[1] for array in arrays.values()))
     carriers, names = estimate.marker_segments, short_marker_names(estimate.marker_names)
     content = {
@@ -175,7 +175,7 @@ def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]
     total = total[:, (total != ABSENT).any(axis=0)].max(axis=1, initial=0, keepdims=True)  # what is modelled
     arrays["sources"] = (foot_sources(estimate.data) if feet else total).astype(float)
     for kind, name in (("measured", "foot_wrench_measured"), ("estimated", "foot_wrench")):
-        wrench = values_of(estimate, name) if feet else values_of(estimate, f"wrench_{kind}")[:, None]
+        wrench = estimate.values(name) if feet else estimate.values(f"wrench_{kind}")[:, None]
         every = [wrench[:, k] for k in range(wrench.shape[1])]
         heights = [support_height(estimate, own) if feet else floor_height(estimate) for own in every]
         points = [centre_of_pressure(own, height)[0] for own, height in zip(every, heights, strict=True)]
@@ -203,7 +203,7 @@ def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]
 def _joint_values(estimate: Estimate, joints: list[Joint]) -> dict[str, Array]:
     """Angles in degrees (mm) and moments, in space per kg, of the joints' columns, in the order of `_rows`."""
     columns = [k for joint in joints for k in joint.columns.values()]
-    moments = values_of(estimate, "moments") / (normalising_mass(estimate) or 1.0)
+    moments = estimate.values("moments") / (normalising_mass(estimate) or 1.0)
     sources = moment_sources(estimate.data).astype(float)
     return {
         "angles": _degrees(estimate)[:, columns],
@@ -213,7 +213,7 @@ def _joint_values(estimate: Estimate, joints: list[Joint]) -> dict[str, Array]:
 
 
 def _degrees(estimate: Estimate) -> Array:
-    return np.asarray(values_of(estimate, "coordinates") * np.where(estimate.is_rotation(), 180.0 / np.pi, 1000.0))
+    return np.asarray(estimate.values("coordinates") * np.where(estimate.is_rotation(), 180.0 / np.pi, 1000.0))
 
 
 def _rows(joints: list[Joint], moment_digits: int) -> list[dict[str, Any]]:

@@ -21,11 +21,6 @@ REGIONS = ("Legs", "Trunk and head", "Arms", "Whole body")
 """Of a body in space; a planar one has "" only."""
 
 
-def values_of(estimate: Estimate, name: str) -> np.ndarray:
-    """A variable of the estimate as an array, time first."""
-    return np.asarray(estimate.data[name].transpose("time", ...).values, dtype=float)
-
-
 def side_lines(estimate: Estimate) -> dict[str, LineStyle]:
     """Line of the right, the left and the middle; in a plane that of the estimate."""
     if is_planar(estimate):
@@ -96,7 +91,7 @@ def joints_of(estimate: Estimate) -> list[Joint]:
 
 def _moving(estimate: Estimate) -> np.ndarray:
     """(C,) bool: not locked."""
-    values, sd = values_of(estimate, "coordinates"), values_of(estimate, "coordinates_sd")
+    values, sd = estimate.values("coordinates"), estimate.values("coordinates_sd")
     return np.asarray((np.nan_to_num(sd) > 0.0).any(axis=0) | (np.ptp(np.nan_to_num(values), axis=0) > 0.0))
 
 

@@ -17,6 +17,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
 AXES = ("x", "y", "z")
+DIMENSIONS = ("time", "coordinate", "marker", "foot", "joint", "sensor", "element", "component", "axis", "axis_")
+"""In the order in which they stand in an `Estimate`'s variables."""
+
+
+def values_of(data: xr.Dataset, name: str) -> np.ndarray:
+    """A variable of an `Estimate`'s data as an array, its dimensions as in the table there."""
+    return np.asarray(data[name].transpose(*DIMENSIONS, missing_dims="ignore").values)
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,6 +106,10 @@ class Estimate:
         """Time of each frame (T,), s."""
         return np.asarray(self.data["time"].values)
 
+    def values(self, name: str) -> np.ndarray:
+        """A variable of ``data`` as an array, its dimensions in the order of the table."""
+        return values_of(self.data, name)
+
     @property
     def coordinate_names(self) -> list[str]:
         """Names of all coordinates of the model, the locked ones too."""
@@ -175,12 +186,12 @@ class Estimate:
     def powers(self) -> np.ndarray:
         """Power (T, C) W of each coordinate, moment times speed; positive adds energy to the body. It comes from where
         the moment does (``moment_source``)."""
-        moments, speeds = (self.data[name].transpose("time", "coordinate").values for name in ("moments", "speeds"))
+        moments, speeds = (self.values(name) for name in ("moments", "speeds"))
         return np.asarray(moments * speeds)
 
     def moments_per_kg(self) -> np.ndarray:
         """Moments (T, C) in N m/kg, forces in N/kg: over the body mass, NaN where that is not known."""
-        moments = self.data["moments"].transpose("time", "coordinate").values
+        moments = self.values("moments")
         return np.asarray(moments / (self.mass_kg or np.nan))
 
     def joint_loads(self, frame: Literal["ground", "parent", "child"] = "ground") -> np.ndarray:
@@ -190,10 +201,10 @@ class Estimate:
             frame: axes: the ground's, those of the parent segment (the ground's where there is none), or those of the
                 segment itself. Out of a planar model's plane the loads are NaN.
         """
-        loads = self.data["joint_loads"].transpose("time", "joint", "component").values
+        loads = self.values("joint_loads")
         if frame == "ground":
             return np.asarray(loads)
-        R_GB = self.data["joint_orientations"].transpose("time", "joint", "axis", "axis_").values
+        R_GB = self.values("joint_orientations")
         if frame == "parent":
             parents = self.data["joint_parent"].values
             R_GB = np.where((parents < 0)[:, None, None], np.eye(3), R_GB[:, parents])

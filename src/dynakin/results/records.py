@@ -23,6 +23,8 @@ MISPLACED = "markers lie"
 """How the warning begins of a model that does not fit the person."""
 NOT_SMOOTHED = "Not smoothed:"
 """How the message begins of a run whose settings have no smoother."""
+IN_STEP = "they were brought into step."
+"""How the message ends of a run whose plates lagged behind the markers, or ran ahead of them."""
 WARNING = "Warning: "
 """How the message begins that says that a trial may not be what it is taken for."""
 _MASS_DOUBTED = ("check the mass", "the mass is wrong")

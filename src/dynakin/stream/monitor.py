@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms_length
 from dynakin.elements import element
 from dynakin.filter.step import StepEstimate
 from dynakin.filter.tracker import Tracker
@@ -125,7 +126,7 @@ class Monitor:
         measured = np.stack([np.asarray(sample[self.initial.recorded_markers[k]], float) for k in used])
         axes = np.array([self.initial.spec.markers[k].measured for k in used])
         off = np.where(axes, self.initial.ground.points_to_ground(measured) - estimate.markers[used], 0.0)
-        return float(np.sqrt(np.nanmean((off**2).sum(axis=1))))
+        return float(rms_length(off))
 
     def published(self, time_s: float, latency_s: float) -> None:
         """An estimate went out, so long after its sample had arrived."""

@@ -25,7 +25,7 @@ from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, pl
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.results.naming import listed
-from dynakin.results.records import warnings_of
+from dynakin.results.records import WARNING, warnings_of
 from dynakin.stream.fusion import Fused
 
 _NOW_S = 0.1  # the present posture, from a few frames
@@ -181,7 +181,7 @@ def begin(
         if check.refusal:
             raise RecordingError(f"plates: {check.refusal}")
         weighed = check.mass_kg_from_plates is not None
-        said += [text for text in check.messages if text.startswith("Warning") or (weighed and "kg" in text)]
+        said += [text for text in check.messages if text.startswith(WARNING) or (weighed and "kg" in text)]
         mass, tolerance = check.mass_kg_from_plates, estimator.noise.plate_load_tolerance
         if mass is not None and tolerance is not None and abs(mass - initial.weighed_kg) > tolerance * mass:
             usable = False

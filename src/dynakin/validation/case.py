@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dynakin.errors import ConfigError
-from dynakin.filter.build import definition_of, identified_of
+from dynakin.filter.build import estimator_of
 from dynakin.recordings.plates.loads import without_plate_loads
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.settings import presets as known_presets
 from dynakin.settings.defaults import CUTOFF_HZ
-from dynakin.settings.effect import check_noise
 from dynakin.settings.settings import Settings
 from dynakin.validation.setup import Setup
 
@@ -56,23 +55,12 @@ def case_of(
     Raises:
         DynakinError: anything wrong with the input, in one line.
     """
-    definition = definition_of(config)
-    check_noise(config, definition.floating)
+    common = estimator_of(config)
     configs = {known_presets.title(name): config.changed(preset=name) for name in (presets or [config.preset])}
     setup = Setup(
-        definition,
+        common,
         {title: one.noise_settings() for title, one in configs.items()},
         cutoff_hz,
-        config.priors,
-        config.bounds,
-        config.side,
-        config.vertical,
-        config.forward,
-        config.estimate,
-        config.plates,
-        config.contacts,
-        config.loads,
-        identified_of(config),
         config.lag_s,
         config.zero,
         config.signs,

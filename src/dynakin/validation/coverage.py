@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from dynakin.arrays import rms
 from dynakin.results.measures.consistency import CONSISTENT, INSIDE, Judgement, judge, mean_interval_95
 from dynakin.results.records import Parameter
 
@@ -146,7 +147,7 @@ def coverage(block: str, names: Sequence[str], error: Array, sd: Array, *, own_m
     judgement = judge(mean_square, band)
     if not own_model and _too_seldom(float(inside.mean()), dof):
         judgement = "overconfident"
-    rms_error, rms_sd = np.sqrt(np.mean(error**2, axis=0)), np.sqrt(np.mean(sd**2, axis=0))
+    rms_error, rms_sd = rms(error, axis=0), rms(sd, axis=0)
     with np.errstate(divide="ignore"):
         sd_over_error = rms_sd / rms_error
     return Coverage(

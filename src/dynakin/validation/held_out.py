@@ -18,7 +18,7 @@ from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.tracking import why_lost, without_lost
@@ -120,7 +120,7 @@ def identify_on(
         estimates[preset], tracker = estimator.track(recording, static=static, lag_s=0.0)
         _refuse_lost(estimates[preset], f"EKF ({preset})")
     initial = tracker.calibrated
-    wrench = measured_wrench(recording, initial, setup.plates, setup.plate_load_tolerance)
+    wrench = measured_wrench(recording, initial, setup.common.plates, setup.plate_load_tolerance)
     ground = initial.ground if same_recording else None
     return IdentifyingTrial(recording, static, setup, initial, estimates, wrench, ground)
 
@@ -168,7 +168,7 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     known = identified.wrench[np.isfinite(identified.wrench).all(axis=1)]
     for label, guess in (("last", known[-1]), ("mean", known.mean(axis=0))):
         found[f"persistence: {label}"] = np.repeat(guess[None], recording.n_frames, axis=0)
-    return Blind(recording, start, found, tuple(notes), setup.plates, setup.plate_load_tolerance)
+    return Blind(recording, start, found, tuple(notes), setup.common.plates, setup.plate_load_tolerance)
 
 
 def judge(blind: Blind, recording: Recording) -> list[Row]:
@@ -291,9 +291,9 @@ def _start(identified: IdentifyingTrial, recording: Recording) -> CalibratedMode
         recording,
         identified.ground,
         identified.static or identified.recording,
-        forward=setup.forward,
-        priors=setup.priors,
-        bounds=setup.bounds,
+        forward=setup.common.forward,
+        priors=setup.common.priors,
+        bounds=setup.common.bounds,
     )
 
 
@@ -315,7 +315,7 @@ def _referred(identified: IdentifyingTrial, recording: Recording, start: Calibra
         identifying.kinematics,
         identified.wrench,
         mass_kg=measured.mass_kg,
-        bounds=setup.bounds,
+        bounds=setup.common.bounds,
     )
     inertia = {"table": fit.table, "least squares in bounds": fit.bounded, "least squares free": fit.free}
     for preset, estimate in identified.estimates.items():
@@ -324,7 +324,7 @@ def _referred(identified: IdentifyingTrial, recording: Recording, start: Calibra
             [values.get(name, table) for name, table in zip(fit.names, fit.table, strict=True)]
         )
     moving = reference_methods(recording, start, setup.definition, setup.cutoff_hz, lengths="frame")
-    wrenches = {f"AT {hertz}": at.data["wrench_estimated"].transpose("time", "component").values}
+    wrenches = {f"AT {hertz}": values_of(at.data, "wrench_estimated")}
     for label, parameters in inertia.items():
         wrenches[f"classical {hertz}, {label}"] = predicted_wrench(moving.chain, moving.kinematics, parameters)
     return wrenches

@@ -19,7 +19,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.progress import Progress, stage
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.mean_curves import MEASURED, MeanCurve, mean_curves, signals
@@ -241,8 +241,8 @@ def trial_of(
         window=evaluation_window(first.time),
         marker_names=tuple(first.marker_names),
         coordinate_names=tuple(first.coordinate_names),
-        measured_markers=data["markers_measured"].transpose("time", "marker", "axis").values,
-        measured_wrench=data["wrench_measured"].transpose("time", "component").values,
+        measured_markers=values_of(data, "markers_measured"),
+        measured_wrench=values_of(data, "wrench_measured"),
         axes=first.modelled_axes(),
         rotation=first.is_rotation(),
         repetitions=repetitions_of(first),
@@ -264,10 +264,10 @@ def _method(name: str, kind: str, data: xr.Dataset) -> Method:
     return Method(
         name,
         kind,
-        data["coordinates"].transpose("time", "coordinate").values,
-        data["moments"].transpose("time", "coordinate").values,
-        data["markers_estimated"].transpose("time", "marker", "axis").values,
-        data["wrench_estimated"].transpose("time", "component").values,
+        values_of(data, "coordinates"),
+        values_of(data, "moments"),
+        values_of(data, "markers_estimated"),
+        values_of(data, "wrench_estimated"),
         data,
     )
 
@@ -292,7 +292,7 @@ def _inverse(first: Estimate, initial: CalibratedModel, cutoff_hz: float, notes:
     """
     found = []
     data = first.data
-    markers = data["markers_measured"].transpose("time", "marker", "axis").values
+    markers = values_of(data, "markers_measured")
     for cutoff, motion in rigid_motions(initial, first.time, markers, usual_cutoffs(cutoff_hz, first.time)).items():
         name = inverse_name(cutoff)
         judged, said = with_plates(motion, data)
@@ -309,8 +309,8 @@ def _referred(kind: str, reference: Reference, initial: CalibratedModel) -> Meth
     return Method(
         kind + cutoff,
         kind,
-        data["coordinates"].transpose("time", "coordinate").values,
-        data["moments"].transpose("time", "coordinate").values,
+        values_of(data, "coordinates"),
+        values_of(data, "moments"),
         markers,
         data["wrench_estimated"].transpose("time", "component").sel(component=list(COMPONENTS)).values,
         data,

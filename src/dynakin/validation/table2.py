@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms_length
 from dynakin.results.measures.fit import SignalFit, signal_fit
 from dynakin.units import COMPONENTS
 from dynakin.validation.methods import Mask, Trial
@@ -51,14 +52,14 @@ def marker_fit(measured: Array, estimated: Array, axes: Mask) -> SignalFit:
     if not seen.any():
         return SignalFit(None, None, None, None)
     a, b = a[seen], b[seen]
-    rms = float(np.sqrt(np.mean(np.sum((a - b) ** 2, axis=1))))
+    off = float(rms_length(a - b))
     span = float(np.linalg.norm(np.ptp(a, axis=0)))
     a, b = a - a.mean(axis=0), b - b.mean(axis=0)
-    size, power = float(np.sqrt(np.mean(np.sum(a**2, axis=1)))), float(np.sqrt(np.sum(a**2) * np.sum(b**2)))
+    size, power = float(rms_length(a)), float(np.sqrt(np.sum(a**2) * np.sum(b**2)))
     return SignalFit(
-        1000.0 * rms,
-        100.0 * rms / size if size > 0.0 else None,
-        100.0 * rms / span if span > 0.0 else None,
+        1000.0 * off,
+        100.0 * off / size if size > 0.0 else None,
+        100.0 * off / span if span > 0.0 else None,
         float(np.sum(a * b)) / power if power > 0.0 else None,
     )
 

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms
+from dynakin.results.estimate import values_of
 from dynakin.results.measures.adaptation import constant_groups
 from dynakin.results.measures.sources import legs_of
 from dynakin.results.naming import listed
@@ -120,10 +122,7 @@ def _where_all_say(trial: Trial) -> list[xr.Dataset]:
     import xarray as xr
 
     found = [
-        {
-            name: m.data[name].transpose("time", "coordinate").values
-            for name in ("coordinates", "speeds", "accelerations")
-        }
+        {name: values_of(m.data, name) for name in ("coordinates", "speeds", "accelerations")}
         | {"moments": m.measured_moments(), "wrench_estimated": m.wrench}
         for m in trial.methods
     ]
@@ -206,7 +205,7 @@ def parameter_errors(parameters: Sequence[Parameter], truth: Mapping[str, float]
         if known:
             true = np.array([truth[p.name] for p in known])
             errors = [np.array([getattr(p, key) for p in known]) / true - 1.0 for key in ("initial", "value")]
-            start, end = (100.0 * float(np.sqrt(np.mean(error**2))) for error in errors)
+            start, end = (100.0 * float(rms(error)) for error in errors)
             found[title] = ParameterError(len(known), start, end)
     return found
 
@@ -214,4 +213,4 @@ def parameter_errors(parameters: Sequence[Parameter], truth: Mapping[str, float]
 def _mean_rms(errors: Array) -> float:
     """Mean of the columns' RMS, of those that are known in some frame; NaN where none is."""
     known = errors[:, np.isfinite(errors).any(axis=0)]
-    return float(np.mean(np.sqrt(np.nanmean(known**2, axis=0)))) if known.size else float("nan")
+    return float(np.mean(rms(known, axis=0))) if known.size else float("nan")

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
+from dynakin.arrays import wrench_about
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.expected import ContactPaths
 from dynakin.filter.prepared import Prepared
@@ -21,7 +22,6 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.units import COMPONENTS
-from dynakin.validation.extrapolation import extrapolated, persisted, span_frames
 from dynakin.validation.reference.inverse_dynamics import (
     RigidMotion,
     filled,
@@ -31,7 +31,18 @@ from dynakin.validation.reference.inverse_dynamics import (
 )
 from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse_kinematics
 from dynakin.validation.setup import Setup
-from dynakin.validation.yardsticks import LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead, with_mean
+from dynakin.validation.yardsticks import (
+    LEFT_OUT,
+    LINEAR,
+    PERSISTENCE,
+    WITHHELD,
+    Figures,
+    ahead,
+    extrapolated,
+    persisted,
+    span_frames,
+    with_mean,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -158,13 +169,13 @@ class _Judged:
         }
 
     def _seen(self, wrench: Array) -> Array:
-        force, moment = wrench[:, :3], wrench[:, 3:] - np.cross(self.below, wrench[:, :3])
+        force, moment = np.split(wrench_about(wrench, self.below), 2, axis=1)
         return np.hstack([force @ self.turn.T, moment @ self.turn.T])
 
 
 def _of(estimate: Estimate, name: str, window: npt.NDArray[np.bool_]) -> Array:
     """A variable of an estimate; of one that is lost within the window nothing: its other frames would look good."""
-    values: Array = estimate.data[name].transpose("time", ...).values
+    values: Array = estimate.values(name)
     return np.full_like(values, np.nan) if estimate.lost[window].any() else values
 
 

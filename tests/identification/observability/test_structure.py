@@ -82,8 +82,8 @@ def test_a_foot_that_is_fixed_hides_its_height_and_its_moment_of_inertia(tmp_pat
     path = changed_model(tmp_path, FIXED_FOOT, NO_TOE)
     structure = structure_of(tracker_of(load_model(path)))
     assert set(structure.in_none) == {"inertia/foot/my", "inertia/foot/izz"}
-    told = " ".join(structure.in_words())
-    assert "without any effect on the ground reaction: foot first moment (up) and foot moment of inertia" in told
+    text = " ".join(structure.in_words())
+    assert "without any effect on the ground reaction: foot first moment (up) and foot moment of inertia" in text
     assert any(
         said == "foot moment of inertia: nothing that is measured depends on it" for said in structure.gauges_in_words
     )

@@ -1,4 +1,4 @@
-"""What a trial told, and advice that keeps its word."""
+"""What a trial observes, and advice that keeps its word."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_tried_motions_keep_the_feet_loaded_and_the_person_in_balance(squat: Tol
 
 
 def test_a_whole_body_keeps_its_feet_and_is_judged_by_the_declared_noise() -> None:
-    """Its noise calibrates itself, and the deviations of constants are told by the declared one, their sums' too."""
+    """Its noise calibrates itself, and the deviations of constants are by the declared one, their sums' too."""
     trial = simulate("fullbody", seed=3, duration_s=5.0)
     subject = Subject(mass_kg=70.0, height_m=1.75, sex="male")
     estimate, tracker = Estimator(load_model("fullbody", subject)).track(trial.recording)

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from dynakin.errors import ModelError
+from dynakin.model.opensim.definition import scale_names
 from dynakin.model.opensim.read import read_osim
-from dynakin.model.opensim.scales import scale_names
 from support.osim.files import COUPLER, CUSTOM, small_model, transform, version_3, version_4
 
 PIN = version_4("PinJoint", ("q",))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dynakin.bindings import _core
+from dynakin.model.opensim.definition import scale_names
 from dynakin.model.opensim.read import read_osim
-from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.spec import to_spec
 from support.osim.files import COUNTS, COUPLER, small_model
 from support.osim.states import as_state, coupled, random_motion, summed

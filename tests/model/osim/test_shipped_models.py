@@ -14,9 +14,9 @@ import pytest
 from numpy.typing import NDArray
 
 from dynakin.bindings import _core
+from dynakin.model.opensim.definition import scale_names
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.read import read_osim
-from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.spec import to_spec
 from support.osim.states import Motion, as_state, coupled, random_motion, summed
 

@@ -66,12 +66,12 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 def test_bad_trials_are_named_and_stop_nothing(study: Path, done: int) -> None:
     assert done == 1
-    told = json.loads((study / "out" / "batch.json").read_text())
-    assert set(told["failed"]) == {CORRUPT, SWAPPED}
-    assert "markers.trc" in told["failed"][CORRUPT]["message"]
-    assert re.search("plate|force|foot", told["failed"][SWAPPED]["message"])
-    assert not any(failure["unexpected"] for failure in told["failed"].values())
-    assert len(told["trials"]) == SUBJECTS * TRIALS - 2
+    written = json.loads((study / "out" / "batch.json").read_text())
+    assert set(written["failed"]) == {CORRUPT, SWAPPED}
+    assert "markers.trc" in written["failed"][CORRUPT]["message"]
+    assert re.search("plate|force|foot", written["failed"][SWAPPED]["message"])
+    assert not any(failure["unexpected"] for failure in written["failed"].values())
+    assert len(written["trials"]) == SUBJECTS * TRIALS - 2
 
 
 def test_table2_is_mean_and_deviation_over_the_good_trials(study: Path, done: int) -> None:

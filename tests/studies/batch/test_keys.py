@@ -42,12 +42,12 @@ def plain(subject: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_its_configuration_is_one_that_run_repeats(plain: Path) -> None:
-    told = tomllib.loads((plain / "config.toml").read_text())
-    assert Path(told["trial"]).is_absolute() and Path(told["output"]) == plain.absolute()
+    written = tomllib.loads((plain / "config.toml").read_text())
+    assert Path(written["trial"]).is_absolute() and Path(written["output"]) == plain.absolute()
     before = (plain / "coordinates.mot").read_text()
     assert main(["run", str(plain / "config.toml")]) == 0
     assert (plain / "coordinates.mot").read_text() == before
-    assert tomllib.loads((plain / "config.toml").read_text()) == told
+    assert tomllib.loads((plain / "config.toml").read_text()) == written
 
 
 def test_smoothing_zero_and_signs_are_those_that_were_asked_for(subject: Path, plain: Path, tmp_path: Path) -> None:

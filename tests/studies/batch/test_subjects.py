@@ -88,9 +88,11 @@ def test_command_line(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture
     arguments = [str(study / "study.toml"), "-o", str(tmp_path / "out"), "--tables-only", "--jobs", "1", option]
     assert main(["batch", *arguments]) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    told = json.loads((tmp_path / "out" / "batch.json").read_text())
-    used = any("Identified inertial parameters are used" in " ".join(row["notes"]) for row in told["trials"].values())
+    written = json.loads((tmp_path / "out" / "batch.json").read_text())
+    used = any(
+        "Identified inertial parameters are used" in " ".join(row["notes"]) for row in written["trials"].values()
+    )
     assert used == (option == "--identify") == ("Subject S1: The identified segment inertia is used" in printed)
-    assert (tmp_path / "out" / "S1" / "subject.toml").is_file() == used and bool(told["subjects"]) == used
+    assert (tmp_path / "out" / "S1" / "subject.toml").is_file() == used and bool(written["subjects"]) == used
     assert main(["batch", *arguments]) == 0  # goes on: nothing is left to do
-    assert json.loads((tmp_path / "out" / "batch.json").read_text())["subjects"] == told["subjects"]
+    assert json.loads((tmp_path / "out" / "batch.json").read_text())["subjects"] == written["subjects"]

@@ -8,9 +8,8 @@ import signal
 import pytest
 
 from dynakin.errors import ConfigError
-from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.engine.pools import open_pool, work
 from dynakin.studies.engine.tasks import Task
-from dynakin.studies.engine.work import work
 from support import engine_tasks as functions
 
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")

@@ -9,9 +9,8 @@ import pytest
 
 from dynakin.errors import ConfigError, OutputError
 from dynakin.studies.engine.journal import Journal, difference
-from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.engine.pools import open_pool, work
 from dynakin.studies.engine.tasks import Task
-from dynakin.studies.engine.work import work
 from support import engine_tasks as functions
 
 SHARED = {"base": 1.1}

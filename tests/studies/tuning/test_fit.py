@@ -14,8 +14,8 @@ from dynakin.settings import presets
 from dynakin.simulation.trial import simulate
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool
-from dynakin.studies.tuning.advice import recommendation
 from dynakin.studies.tuning.fit import Fit, Fitter, belongs_to_fit, usual_names
+from dynakin.studies.tuning.in_words import recommendation
 from dynakin.studies.tuning.likelihood import REACH, Likelihood
 from dynakin.studies.tuning.optimise import curvature, deviations, minimise
 from dynakin.studies.tuning.score import Shared
@@ -119,11 +119,11 @@ def test_one_trial_is_held_out_by_halves_and_written_as_a_preset(tmp_path: Path,
     trial = [str(files / "markers.trc"), "--forces", str(files / "forces.mot"), "--model", "sagittal7", "--mass", "70"]
     code = main(["tune", "fit", *trial, "--vary", "force_variance_n2", "--backend", "threads", "-o", str(folder)])
     assert code == 0
-    told = json.loads((folder / "fit.json").read_text())
-    assert [fold["held_out"].split(", ")[1] for fold in told["held_out"]] == ["first half", "second half"]
-    assert set(told["figures"]) == {"fitted", "start", "paper"}
-    assert presets.preset(str(folder / "preset_fit.toml")).force_variance_n2 == told["settings"][0]["value"]
-    assert told["recommendation"][0] in " ".join(capsys.readouterr().out.split())
+    written = json.loads((folder / "fit.json").read_text())
+    assert [fold["held_out"].split(", ")[1] for fold in written["held_out"]] == ["first half", "second half"]
+    assert set(written["figures"]) == {"fitted", "start", "paper"}
+    assert presets.preset(str(folder / "preset_fit.toml")).force_variance_n2 == written["settings"][0]["value"]
+    assert written["recommendation"][0] in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 
 import dynakin
 from dynakin.bindings import _core
+from dynakin.filter.estimator import Estimator
 from dynakin.filter.prepared import Prepared
 from dynakin.model.spec import free_names
 from dynakin.simulation.output import SimulatedTrial
@@ -30,7 +31,9 @@ def simulated() -> SimulatedTrial:
 
 @pytest.fixture(scope="module")
 def setup() -> Setup:
-    return Setup(dynakin.load_model("fullbody", dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")), lag_s=0.0)
+    return Setup(
+        Estimator(dynakin.load_model("fullbody", dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male"))), lag_s=0.0
+    )
 
 
 @pytest.fixture(scope="module")

@@ -75,12 +75,12 @@ class Bench:
         frames = int(np.searchsorted(time, time[0] + LONGEST_S)) if time[-1] - time[0] > LONGEST_S else len(time)
         first = (len(time) - frames) // 2
         stretch = slice(first, first + frames)
-        self.missing = np.isnan(estimate.data["markers_measured"].values[stretch][:, :, estimate.modelled_axes()]).any(
+        self.missing = np.isnan(estimate.values("markers_measured")[stretch][:, :, estimate.modelled_axes()]).any(
             axis=2
         )
         modelled = np.array(initial.spec.wrench_measured)
-        self.blind = np.isnan(estimate.data["wrench_measured"].values[stretch][:, modelled]).any(axis=1)
-        state = estimate.data["state"].values
+        self.blind = np.isnan(estimate.values("wrench_measured")[stretch][:, modelled]).any(axis=1)
+        state = estimate.values("state")
         self.constants = state[-1].copy()
         for block in ("soft_tissue", "plates"):  # their means
             self.constants[self.measured.block(block)] = 0.0

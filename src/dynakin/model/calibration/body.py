@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from dynakin.arrays import runs
+from dynakin.arrays import rms, runs
 from dynakin.errors import ModelError
 from dynakin.model.calibration.completion import Proportions
 from dynakin.model.calibration.frames import Trial
@@ -142,7 +142,7 @@ def impulse_load(
         return None
     mass = impulse / need
     apart = np.concatenate(pushes) - mass * (GRAVITY_M_S2 + np.concatenate(accelerations))
-    if np.sqrt(np.mean(apart**2)) > _APART * mass * GRAVITY_M_S2:
+    if rms(apart) > _APART * mass * GRAVITY_M_S2:
         return None
     return mass, seconds
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +14,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.plan import ModelPlan
+from dynakin.model.spec import in_layout
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import level_pressure
 from dynakin.recordings.plates.pressure import LOADED_N
@@ -141,6 +144,47 @@ class CalibratedModel:
                 f"model {self.spec.name} comes from an OpenSim file; expected a built-in model or a .toml file for this"
             )
         return self.plan
+
+
+class StartingState(NamedTuple):
+    """What a `CalibratedModel` says of each element of the state."""
+
+    names: tuple[str, ...]
+    x0: Array
+    sd0: Array
+    lower: Array
+    upper: Array
+    table: Array
+
+
+def starting_state(
+    spec: _core.ModelSpec,
+    *,
+    bounds: Mapping[str, tuple[float, float]],
+    prior: Mapping[str, float],
+    table: Mapping[str, float],
+    speeds: Mapping[str, float],
+) -> tuple[StartingState, list[str]]:
+    """The state that a specification starts with, within its bounds, and a sentence on each element that is put there.
+
+    Args:
+        bounds, prior, table: by element; infinite, NaN and NaN of what is not named. speeds: by coordinate.
+    """
+    core = _core.Model(spec)
+    names = list(core.layout.names)
+    x0 = np.array(core.initial_state(), dtype=float)
+    for k, name in enumerate(names):
+        if name.endswith("/speed"):
+            x0[k] = speeds.get(name.removesuffix("/speed"), x0[k])
+    lower = in_layout(names, {name: pair[0] for name, pair in bounds.items()}, -np.inf)
+    upper = in_layout(names, {name: pair[1] for name, pair in bounds.items()}, np.inf)
+    said = [
+        f"Start of {names[k]} ({x0[k]:.3f}) lies beyond its bounds {lower[k]:.3f} to {upper[k]:.3f}: put on the bound."
+        for k in np.flatnonzero((x0 < lower) | (x0 > upper))
+    ]
+    within = np.clip(x0, lower, upper)
+    sd0, table_values = in_layout(names, prior, np.nan), in_layout(names, table, np.nan)
+    return StartingState(tuple(names), within, sd0, lower, upper, table_values), said
 
 
 def first_centre_of_pressure(recording: Recording, ground: GroundFrame) -> Array:

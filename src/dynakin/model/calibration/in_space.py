@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import Trial
@@ -107,7 +108,7 @@ def _postures(model: _core.Model, paths: Array, limits: dict[str, Interval]) -> 
 def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tuple[ModelPlan, list[str]]:
     """Marker places as their mean over frames of the trial, postures fitted and places averaged by turns."""
     frames = _spread(np.flatnonzero(_enough(paths)), _AVERAGED)
-    rms: list[float] = []
+    fit_mm: list[float] = []
     states: dict[int, Array] = {}
     for _ in range(_TURNS):
         model = _core.Model(to_core(plan))
@@ -124,7 +125,7 @@ def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tup
             on = [model.segment_names.index(site.segment) for site in plan.sites]
             found.append([R[s].T @ (paths[frame, k] - p[s]) for k, s in enumerate(on)])
             fits.append(fit.rms_m)
-        rms.append(1000.0 * float(np.sqrt(np.mean(np.square(fits)))))
+        fit_mm.append(1000.0 * float(rms(fits)))
         places = np.array(found)
         seen = [places[np.isfinite(places[:, k]).all(axis=1), k] for k in range(len(plan.sites))]
         means = [own.mean(axis=0) if len(own) else None for own in seen]
@@ -136,8 +137,8 @@ def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tup
             ),
         )
     return plan, [
-        f"Marker places: averaged over {len(frames)} frames of the trial, in {_TURNS} turns (rigid fit {rms[0]:.1f} mm "
-        f"before, {rms[-1]:.1f} mm in the last turn)."
+        f"Marker places: averaged over {len(frames)} frames of the trial, in {_TURNS} turns (rigid fit "
+        f"{fit_mm[0]:.1f} mm before, {fit_mm[-1]:.1f} mm in the last turn)."
     ]
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from dynakin.arrays import rms
 from dynakin.recordings.rigidity import RigidMotion
 
 Array = npt.NDArray[np.float64]
@@ -115,7 +116,7 @@ def joint_axis(motion: JointMotion) -> JointAxis:
     less, more = (_axes(motion.part(half))[0] for half in np.array_split(order, 2))
     sd_deg = np.sqrt(np.rad2deg(np.sqrt(variance)) ** 2 + angle_deg(a, b) ** 2 + angle_deg(less, more, True) ** 2)
     apart = np.linalg.norm(a - motion.turns @ b, axis=1)
-    return JointAxis(mean, float(sd_deg), float(np.rad2deg(np.sqrt((apart**2).mean()))))
+    return JointAxis(mean, float(sd_deg), float(np.rad2deg(rms(apart))))
 
 
 def _centres(motion: JointMotion, plane: Plane | None) -> tuple[Array, Array]:

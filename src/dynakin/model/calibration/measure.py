@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -12,16 +11,17 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
 from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
-from dynakin.model.calibration.completion import Completed, completed, free
+from dynakin.model.calibration.completion import Completed, completed
 from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
+from dynakin.model.calibration.landmark_markers import in_both, needed_markers, seen_together, table_markers
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, Legs, legs_in_motion
 from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
-from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
+from dynakin.model.calibration.posture import Posture, find_geometry, find_posture
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
-from dynakin.model.markers.recognise import lacking, recognise
+from dynakin.model.markers.recognise import recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
@@ -35,6 +35,33 @@ from dynakin.results.naming import listed, words
 from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What is measured, and on what; attributes as in ``ModelDefinition`` and ``Definition.calibrate``."""
+
+    model: ModelFile
+    subject: Subject
+    table: BodyTable
+    marker_set: MarkerSetFile | None
+    functional: Mapping[str, Recording]
+    recording: Recording
+    static: Recording | None
+    side: str
+    vertical: str
+    forward: str | tuple[float, float, float]
+    ground: GroundFrame | None
+
+    @property
+    def recordings(self) -> list[Recording]:
+        """The standing trial first."""
+        return [r for r in (self.static, self.recording) if r is not None]
+
+    def find_ground(self, recording: Recording, match: MarkerMatch) -> GroundFrame:
+        """Of one of the recordings."""
+        find = find_laboratory_frame if self.model.floating else find_ground_frame
+        return find(recording, vertical=self.vertical, forward=self.forward, pairs=match.facing_pairs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,65 +82,146 @@ class Measured:
     still: bool  # the person stands still in the calibration frames
 
 
-def measure(
-    model: ModelFile,
-    subject: Subject,
-    table: BodyTable,
-    asked_markers: MarkerSetFile | None,
-    recording: Recording,
-    ground: GroundFrame | None,
-    *,
-    static: Recording | None,
-    side: str,
-    vertical: str,
-    forward: str | tuple[float, float, float],
-    functional: Mapping[str, Recording],
-) -> tuple[ModelPlan, Measured]:
-    """The model filled with what the recording shows; arguments and errors as of ``Definition.calibrate``."""
-    if functional and not model.sided:
-        raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
-    recognised = recognise(recording, asked_markers)
-    messages = list(recognised.messages)
-    find = partial(find_laboratory_frame if model.floating else find_ground_frame, vertical=vertical, forward=forward)
-    as_asked = Trial.of(
-        recording, recognised.match, ground or find(recording, pairs=recognised.match.facing_pairs)
-    )  # fmt: skip
-    messages += as_asked.ground.how
-    trial = as_asked.facing() if model.floating else as_asked  # what is measured on landmarks takes X for forward
-    if not model.sided:
-        side, how = choose_side(trial.match, recording, side)
-        messages.append(how)
-    else:
-        side = "both"
-    source = trial
-    if static is not None:
-        stands = recognise(static, recognised.match.marker_set)
-        messages += [f"{said} ({static.name})" for said in stands.messages]
-        source = Trial.of(static, stands.match, find(static, pairs=stands.match.facing_pairs))
-        source = source.facing() if model.floating else source
-        if other := another_person(recording, static):
-            messages.append(f"Warning: {other}. Lengths and marker places are those of {static.name}.")
-    # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
-    common = source.match if model.sided else _common(trial.match, source.match)
-    finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
-    if model.sided:
-        finder, apart = seen_together(model, finder, trial.match, source)
-        messages += apart
-    model = as_marked(model, trial.match, finder)
-    chosen, left_out = candidates(model, trial.match, side)
-    locks, bare, locked = find_locks(model, trial.match, chosen)
-    messages += left_out + locked
+@dataclass(frozen=True, eq=False)
+class _Trials:
+    """The recordings with their markers known by name."""
 
+    as_asked: Trial
+    trial: Trial  # of a floating model with X forward: what is measured on landmarks takes it for that
+    source: Trial  # where lengths and places are measured: the standing trial, or the same
+    side: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Marked:
+    """The model with its markers, and how landmarks are found from them."""
+
+    model: ModelFile
+    finder: LandmarkFinder
+    chosen: list[Candidate]
+    locks: dict[str, float | None]
+    bare: dict[str, tuple[str, ...]]  # segment without markers -> coordinates that are locked because of that
+    height: tuple[float | None, str] | None  # of a model in space, whose landmarks need it
+    needed: set[MarkerKey]
+
+
+@dataclass(frozen=True, eq=False)
+class _Still:
+    """The frames on which lengths and places are measured, about the model's ground origin."""
+
+    trial: Trial
+    source: Trial
+    frames: npt.NDArray[np.intp]
+    stands: bool
+
+
+def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
+    """The model filled with what the recording shows; errors as of ``Definition.calibrate``."""
+    model, subject, table = asked.model, asked.subject, asked.table
+    if asked.functional and not model.sided:
+        raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
+    messages: list[str] = []
+    trials = _matched(asked, messages)
+    marked = _marked(asked, trials, messages)
+    model, finder, locks = marked.model, marked.finder, marked.locks
+    still = _calibration_frames(asked, trials, marked, messages)
+    found, unmarked = _landmarks(asked, marked, still, messages)
+    mass_kg, height_m = _mass_and_height(asked, marked, still, messages)
+    messages += found.messages
+    check_body_mass(subject, mass_kg, height_m)
+    if subject.sex is None:
+        messages.append(
+            "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors)."
+        )
+    unmeasured = _unmeasured_lengths(model, table, found.landmarks, height_m, messages)
+    geometry, posture = find_geometry(model, found.landmarks, locks, unmeasured)
+    on_frames = (still.source, posture, still.frames)
+    sites, placed = place_sites(marked.chosen, on_frames, still.trial, finder, geometry, model, marked.needed)
+    messages += placed
+    inertia, parts = segment_inertia(
+        model, table, found.landmarks, posture, mass_kg, height_m if height_m is not None else np.nan
+    )
+    check_masses(model, inertia, parts, mass_kg, height_m, messages)
+    start = (
+        posture
+        if model.sided
+        else _first_posture(model, geometry, finder, still.trial, marked.needed, posture, messages)
+    )
+    plan = ModelPlan(
+        model, geometry, start.coordinates, fixed_lengths(model, set(marked.bare), set(found.added)), inertia,
+        {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
+    )  # fmt: skip
+    report(model, plan, mass_kg, messages)
+    trial = trials.as_asked if model.floating else still.trial
+    placed_names = {site.recorded for site in sites}
+    return plan, Measured(
+        ground=trial.ground,
+        side=trials.side,
+        mass_kg=mass_kg,
+        height_m=height_m,
+        parts=parts,
+        messages=tuple(messages),
+        trial=trial,
+        unplaced=tuple(c for c in marked.chosen if c.recorded not in placed_names),
+        held={name: f"segment {segment} has no markers" for segment, names in marked.bare.items() for name in names},
+        unmarked_joints=unmarked,
+        one_sided_joints=tuple(n for n in LEG_JOINTS if n in finder.usual_widths - {*(asked.functional or ())}),
+        still=still.stands,
+    )
+
+
+def _matched(asked: Asked, messages: list[str]) -> _Trials:
+    """Markers and ground of the recordings."""
+    model, recording, static = asked.model, asked.recording, asked.static
+    recognised = recognise(recording, asked.marker_set)
+    messages += recognised.messages
+    as_asked = Trial.of(recording, recognised.match, asked.ground or asked.find_ground(recording, recognised.match))
+    messages += as_asked.ground.how
+    trial = as_asked.facing() if model.floating else as_asked
+    side = "both"
+    if not model.sided:
+        side, how = choose_side(trial.match, recording, asked.side)
+        messages.append(how)
+    if static is None:
+        return _Trials(as_asked, trial, trial, side)
+    stands = recognise(static, recognised.match.marker_set)
+    messages += [f"{said} ({static.name})" for said in stands.messages]
+    source = Trial.of(static, stands.match, asked.find_ground(static, stands.match))
+    source = source.facing() if model.floating else source
+    if other := another_person(recording, static):
+        messages.append(f"Warning: {other}. Lengths and marker places are those of {static.name}.")
+    return _Trials(as_asked, trial, source, side)
+
+
+def _marked(asked: Asked, trials: _Trials, messages: list[str]) -> _Marked:
+    """What of the model the markers show, and the recipes of its landmarks with what they need to know of the body."""
+    model, match, source = asked.model, trials.trial.match, trials.source
+    # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
+    common = source.match if model.sided else in_both(match, source.match)
+    finder = LandmarkFinder(common, trials.side, asked.subject.sex, model.planar, in_space=model.sided)
     if model.sided:
-        entries = [r for r in (static, recording) if r is not None]
-        height_m, how_high = find_height(subject, entries, source, finder)
-        finder.height_m = height_m
-        finder.widths_m, said = _joint_widths(entries, finder)
+        finder, apart = seen_together(model, finder, match, source)
+        messages += apart
+    model = as_marked(model, match, finder)
+    chosen, left_out = candidates(model, match, trials.side)
+    locks, bare, locked = find_locks(model, match, chosen)
+    messages += left_out + locked
+    height = None
+    if model.sided:
+        height = find_height(asked.subject, asked.recordings, source, finder)
+        finder.height_m = height[0]
+        finder.widths_m, said = _joint_widths(asked.recordings, finder)
         messages += said
         finder.sole = flat_slopes(source)
-    needed = needed_markers(model, finder, locks)
+    return _Marked(model, finder, chosen, locks, bare, height, needed_markers(model, finder, locks))
+
+
+def _calibration_frames(asked: Asked, trials: _Trials, marked: _Marked, messages: list[str]) -> _Still:
+    """Where the person stands still, or what comes nearest to it."""
+    model, finder, needed, static = marked.model, marked.finder, marked.needed, asked.static
+    trial, source = trials.trial, trials.source
     refuse_moving_origin(model, trial, finder)
-    wished = needed | table_markers(model, table, finder)
+    wished = needed | table_markers(model, asked.table, finder)
     if static is None or not model.sided:  # else the trial may lack markers that only the standing person wears
         frames, which = trial.calibration_frames(needed, wished)
         trial = _at_origin(model, trial, finder, frames)
@@ -122,79 +230,58 @@ def measure(
     source = trial if static is None else _at_origin(model, source, finder, frames)
     messages.append(f"Lengths and marker places: {which}.")
     window = standing_window(source.recording)
-    still = window is not None and window.start <= frames[0] < window.stop
-    standing = source.median(frames)
-    found, unmarked = Completed(finder.find(standing)), tuple[str, ...]()
-    if model.sided:
-        landmarks = finder.find_in_space(standing)
-        if functional:
-            landmarks, how_found = functional_landmarks(functional, landmarks, finder, source, frames)
-            messages += how_found
-        legs = Legs(landmarks)
-        if finder.height_m is not None:
-            legs = legs_in_motion(landmarks, trial.recording, source, frames, finder.height_m)
-            messages += legs.messages
-        try:
-            found = completed(
-                model, table, locks, legs.landmarks, standing, finder.height_m or np.nan, trial.match.where
-            )
-        except ModelError as error:
-            reasons = dict.fromkeys(source.match.left_out.values())
-            raise ModelError("; ".join([error.message, *reasons])) from None
-        supposed = _supposed_legs(found, legs, chosen)
-        if supposed and not still:
-            raise ModelError(_no_legs(supposed, source, static, legs))
-        unmarked = tuple(name for name in LEG_JOINTS if name in (*legs.joints, *supposed))
-        if unmarked:
-            joints = listed([words(name) for name in sorted(unmarked)])
-            messages.append(
-                f"Warning: no marker shows {joints}: they are where the movement, or else the "
-                "proportions of an adult who stands, has them, to one or two centimetres. Give a standing trial with "
-                "markers on knees and ankles (--static)."
-            )
-    landmarks = found.landmarks
+    return _Still(trial, source, frames, window is not None and window.start <= frames[0] < window.stop)
 
-    set_, names = source.match.marker_set, source.match.names
-    mass_kg, how = find_mass(
-        subject,
-        [(t.recording, t.ground) for t in ([source, trial] if static is not None else [trial])],
-        source.match.foot_markers,
-        [name for (marker, _), name in names.items() if set_.marker(marker).segment == "pelvis"],
-        finder.height_m if model.sided else None,
-    )
-    messages.append(how)
+
+def _landmarks(asked: Asked, marked: _Marked, still: _Still, messages: list[str]) -> tuple[Completed, tuple[str, ...]]:
+    """Landmarks of the standing person, in space completed by movement and proportions; joints that no marker shows."""
+    model, finder, source = marked.model, marked.finder, still.source
+    standing = source.median(still.frames)
+    found = Completed(finder.find(standing))
     if not model.sided:
-        height_m, how_high = find_height(subject, [r for r in (static, recording) if r is not None], source)
-    messages.append(how_high)
-    messages += found.messages
-    check_body_mass(subject, mass_kg, height_m)
-    if subject.sex is None:
+        return found, ()
+    landmarks = finder.find_in_space(standing)
+    if asked.functional:
+        landmarks, how_found = functional_landmarks(asked.functional, landmarks, finder, source, still.frames)
+        messages += how_found
+    legs = Legs(landmarks)
+    if finder.height_m is not None:
+        legs = legs_in_motion(landmarks, still.trial.recording, source, still.frames, finder.height_m)
+        messages += legs.messages
+    try:
+        height_m = finder.height_m or np.nan
+        found = completed(model, asked.table, marked.locks, legs.landmarks, standing, height_m, still.trial.match.where)
+    except ModelError as error:
+        reasons = dict.fromkeys(source.match.left_out.values())
+        raise ModelError("; ".join([error.message, *reasons])) from None
+    supposed = _supposed_legs(found, legs, marked.chosen)
+    if supposed and not still.stands:
+        raise ModelError(_no_legs(supposed, source, asked.static, legs))
+    unmarked = tuple(name for name in LEG_JOINTS if name in (*legs.joints, *supposed))
+    if unmarked:
+        joints = listed([words(name) for name in sorted(unmarked)])
         messages.append(
-            "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors)."
+            f"Warning: no marker shows {joints}: they are where the movement, or else the "
+            "proportions of an adult who stands, has them, to one or two centimetres. Give a standing trial with "
+            "markers on knees and ankles (--static)."
         )
+    return found, unmarked
 
-    unmeasured = _unmeasured_lengths(model, table, landmarks, height_m, messages)
-    geometry, posture = find_geometry(model, landmarks, locks, unmeasured)
-    sites, placed = place_sites(chosen, (source, posture, frames), trial, finder, geometry, model, needed)
-    messages += placed
-    inertia, parts = segment_inertia(
-        model, table, landmarks, posture, mass_kg, height_m if height_m is not None else np.nan
+
+def _mass_and_height(asked: Asked, marked: _Marked, still: _Still, messages: list[str]) -> tuple[float, float | None]:
+    """Of the person; a planar model's height is asked for only now, and by markers about its origin."""
+    set_, names = still.source.match.marker_set, still.source.match.names
+    weighed = [still.source, still.trial] if asked.static is not None else [still.trial]
+    mass_kg, how = find_mass(
+        asked.subject,
+        [(trial.recording, trial.ground) for trial in weighed],
+        still.source.match.foot_markers,
+        [name for (marker, _), name in names.items() if set_.marker(marker).segment == "pelvis"],
+        marked.finder.height_m if marked.model.sided else None,
     )
-    check_masses(model, inertia, parts, mass_kg, height_m, messages)
-    start = posture if model.sided else _first_posture(model, geometry, finder, trial, needed, posture, messages)
-    plan = ModelPlan(
-        model, geometry, start.coordinates, fixed_lengths(model, set(bare), set(found.added)), inertia,
-        {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
-    )  # fmt: skip
-    report(model, plan, mass_kg, messages)
-    placed_names = {site.recorded for site in sites}
-    left = tuple(c for c in chosen if c.recorded not in placed_names)
-    held = {name: f"segment {segment} has no markers" for segment, names in bare.items() for name in names}
-    trial = as_asked if model.floating else trial
-    one_sided = tuple(name for name in LEG_JOINTS if name in finder.usual_widths - {*(functional or ())})
-    return plan, Measured(
-        trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, held, unmarked, one_sided, still
-    )
+    height_m, how_high = marked.height or find_height(asked.subject, asked.recordings, still.source)
+    messages += [how, how_high]
+    return mass_kg, height_m
 
 
 def _supposed_legs(found: Completed, legs: Legs, chosen: Sequence[Candidate]) -> list[str]:
@@ -212,73 +299,6 @@ def _no_legs(supposed: Sequence[str], source: Trial, static: Recording | None, l
     return " ".join([f"{source.match.where}: {said}; expected {expected}.", *legs.failed])
 
 
-def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
-    """Only markers that both recordings have, so that a joint centre is the same recipe in both."""
-    if other is match:
-        return match
-    names = {key: name for key, name in match.names.items() if key in other.names}
-    recorded = tuple(name for name in match.recorded if name in other.recorded)
-    where, left_out = f"{match.where} with {other.where}", match.left_out | other.left_out
-    return MarkerMatch(match.marker_set, names, recorded, where, left_out)
-
-
-def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, float | None]) -> set[MarkerKey]:
-    """Markers of every landmark that the lengths and frames need. In the plane a recording without one of them is
-    refused; in space the others are completed (`completion`)."""
-    wanted: dict[str, str] = {}
-    for segment in model.segments:
-        if not free(segment, locks):
-            continue  # its pose follows from its parent's
-        for name in frame_landmarks(segment):
-            wanted.setdefault(name, f"segment {segment.name!r} of model {model.name}")
-    if model.ground.origin:
-        wanted.setdefault(model.ground.origin, f"the ground origin of model {model.name}")
-    if not model.sided:
-        finder.require(wanted)
-    keys: set[MarkerKey] = set()
-    for name in wanted:
-        own, plain = finder.of_side(name)
-        if own.known(plain):
-            keys |= own.markers_of(plain)
-    for length in model.lengths:
-        if length.between is not None and all(finder.known(name) for name in length.between):
-            keys |= finder.markers_of(length.between[0]) | finder.markers_of(length.between[1])
-    return keys
-
-
-def seen_together(
-    model: ModelFile, finder: LandmarkFinder, match: MarkerMatch, source: Trial
-) -> tuple[LandmarkFinder, list[str]]:
-    """The finder without markers that are never seen with the others of the landmarks, whose recipes fall back on what
-    is left, and a sentence on them. They stay markers of their segments.
-
-    Raises:
-        ModelError: what is seen together is no pelvis and leg.
-    """
-    apart: dict[MarkerKey, str] = {}
-    while True:
-        marked = as_marked(model, match, finder)
-        locks = find_locks(marked, match, candidates(marked, match, "both")[0])[0]
-        needed = needed_markers(marked, finder, locks)
-        gone = source.seen_apart(needed)
-        if not gone:
-            break
-        apart |= {key: finder.match.names[key] for key in sorted(gone)}
-        left = finder.match.without(gone, "it is never seen together with the others")
-        if lacks := lacking(left.marker_set, left.names):
-            raise ModelError(
-                f"{source.match.where}: no frame shows all {len(needed)} markers of the joint centres, and frames that "
-                f"show most of them have nothing {'; '.join(lacks)}; expected a frame with pelvis and leg"
-            )
-        finder = replace(finder, match=left, _chosen={})
-    if not apart:
-        return finder, []
-    return finder, [
-        f"Warning: no frame of {source.recording.name} shows all markers of the joint centres: measured without "
-        f"{', '.join(apart.values())}, which {'is' if len(apart) == 1 else 'are'} not seen when the others are."
-    ]
-
-
 def flat_slopes(trial: Trial) -> dict[str, float]:
     """Side -> slope (rad) of the line from heel to toe while that foot stands flat; none for a foot that never does."""
     found: dict[str, float] = {}
@@ -293,19 +313,6 @@ def flat_slopes(trial: Trial) -> dict[str, float]:
             heel, toe = (trial.ground.points_to_ground(trial.recording.marker(n)) for n in own[side])
             found[side] = float(np.median(slope((toe - heel)[flat])))
     return found
-
-
-def table_markers(model: ModelFile, table: BodyTable, finder: LandmarkFinder) -> set[MarkerKey]:
-    """Markers of the landmarks at which the inertia table's parts lie, as far as the recording has them."""
-    names: set[str] = set()
-    for segment in model.segments:
-        for part in (table.part(name) for name in segment.parts):
-            for point in (part.axis_from, part.axis_to, part.origin, part.length_from, part.length_to):
-                names |= {point.start, point.end}
-    keys: set[MarkerKey] = set()
-    for name in sorted(names):
-        keys |= finder.markers_of(name)
-    return keys
 
 
 def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: npt.NDArray[np.intp]) -> Trial:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import wrapped
+from dynakin.arrays import rms, wrapped
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.joint_fit import joint_coordinates
@@ -177,7 +177,7 @@ class _Body:
         )
         endless = self.turns & np.isinf(self.lower) & np.isinf(self.upper) & wrap
         end[endless] = wrapped(end[endless])
-        return _Fit(end, float(np.sqrt(np.nanmean(self.distances(end) ** 2))))
+        return _Fit(end, float(rms(self.distances(end))))
 
     def fit(self, guess: Array | None = None) -> _Fit:
         """The best of several starts; the first good one where there is one."""

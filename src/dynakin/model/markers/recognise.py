@@ -29,6 +29,7 @@ from dynakin.model.markers.match import (
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.markers.swaps import Swap, distance_words, find_swaps
 from dynakin.recordings.recording import Recording
+from dynakin.results.records import WARNING
 from dynakin.units import PERSON_HEIGHT_M
 
 _LISTED = 8  # names in a sentence
@@ -312,10 +313,10 @@ def _misplaced(
 def _refuse_wrong_set(found: Recognised, where: str) -> None:
     total = len(found.match.names) + len(found.match.left_out)
     if found.wrong_n > max(_FEW_WRONG, _MANY_WRONG * total):
-        example = next(said for said in found.messages if said.startswith("Warning"))
+        example = found.messages[0]  # `checked` says nothing but warnings
         raise ModelError(
             f"{where}: the names fit marker set {found.match.marker_set.name}, but {found.wrong_n} of {total} markers "
-            f"are not where it says ({example.removeprefix('Warning: ').split(';')[0]}); expected the set that was "
+            f"are not where it says ({example.removeprefix(WARNING).split(';')[0]}); expected the set that was "
             "used, or one of your own: dynakin markers new TRIAL -o my.toml"
         )
 

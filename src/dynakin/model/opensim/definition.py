@@ -3,13 +3,15 @@ joints and inertia come from the file, mass and posture are measured."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from dynakin.bindings import _core
-from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
+from dynakin.errors import ModelError
+from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure, starting_state
 from dynakin.model.calibration.pose_start import start_posture
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.opensim.calibrate import (
@@ -27,16 +29,14 @@ from dynakin.model.opensim.calibrate import (
 )
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.read import read_osim
-from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import moved_by, to_spec, unseen
 from dynakin.model.schema import kinds_of
-from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
 from dynakin.settings.model import Bounds, OpenSimOptions, Priors
-from dynakin.settings.strict import validate
+from dynakin.settings.strict import nearest, validate
 from dynakin.settings.subject import Subject
 
 _MODEL_M = 0.003
@@ -164,30 +164,27 @@ class OpenSimDefinition:
         messages += beyond_range(source, fit.coordinates)
         spec = spec_at(fit.coordinates)
         refuse_too_few(source, spec, [name for _, name in chosen], recording)
-        core = _core.Model(spec)
-        names = list(core.layout.names)
         bodies = {body.name: body.rigid for body in source.bodies}
         reach = reach_of(source)
         lengths = {parameter.name: 1.0 for parameter in spec.parameters}
         places = {marker.name: np.array(marker.location) for marker, _ in chosen}
-        intervals = state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds())
-        lower = in_layout(names, {name: pair[0] for name, pair in intervals.items()}, -np.inf)
-        upper = in_layout(names, {name: pair[1] for name, pair in intervals.items()}, np.inf)
-        x0 = np.array(core.initial_state(), dtype=float)
         table = {
             f"inertia/{s.name}/{k}": v for s in spec.segments for k, v in zip(INERTIA_NAMES, s.inertia, strict=True)
         }
         skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
         kinds, known = kinds_of(spec.segments), priors or Priors()
         known = known.changed(marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
+        state, said = starting_state(
+            spec,
+            bounds=state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds()),
+            prior=state_prior(kinds, lengths, {}, places, bodies, reach, known),
+            table=table,
+            speeds={},
+        )
+        messages += said
         return CalibratedModel(
             spec=spec,
-            names=tuple(names),
-            x0=np.clip(x0, lower, upper),
-            sd0=in_layout(names, state_prior(kinds, lengths, {}, places, bodies, reach, known), np.nan),
-            lower=lower,
-            upper=upper,
-            table=in_layout(names, table, np.nan),
+            **state._asdict(),
             marker_variance=skin[:, 0],
             soft_tissue_m=skin[:, 1],
             ground=frame,
@@ -226,3 +223,46 @@ def load_opensim(
     chosen = validate(OpenSimOptions, given | fields, "OpenSim model")
     scales = scale_names(source, chosen.scale, share=chosen.share_sides)
     return OpenSimDefinition(source, subject or Subject(), chosen, scales)
+
+
+PREFIX = "scale_"
+_SIDES = (("_r", "_l"), ("_right", "_left"), ("r_", "l_"), ("right_", "left_"), ("_R", "_L"), ("R_", "L_"))
+
+
+def without_side(name: str, names: Iterable[str]) -> str:
+    """The name without its side where its mirror image is there too ("femur_r" with "femur_l": "femur")."""
+    there = set(names)
+    for pair in _SIDES:
+        for own, other in (pair, pair[::-1]):
+            if own.startswith("_") and name.endswith(own) and name.removesuffix(own) + other in there:
+                return name.removesuffix(own)
+            if own.endswith("_") and name.startswith(own) and other + name.removeprefix(own) in there:
+                return name.removeprefix(own)
+    return name
+
+
+def scale_names(
+    model: OpenSimModel, bodies: Sequence[str] | str | None = "all", *, share: bool = True
+) -> dict[str, str]:
+    """The scale parameter of each body that has one.
+
+    Args:
+        bodies: which bodies are scaled: "all", some names, or None for none of them.
+        share: whether mirrored bodies (femur_r, femur_l) have one parameter.
+
+    Raises:
+        ModelError: a name that is no body of the model.
+    """
+    known = [body.name for body in model.bodies]
+    if bodies is None or bodies == "all":
+        chosen: Sequence[str] = known if bodies == "all" else []
+    elif isinstance(bodies, str):
+        raise ModelError(f"scale is {bodies!r}, expected 'all', a list of bodies or none")
+    else:
+        chosen = bodies
+    for name in chosen:
+        if name not in known:
+            raise ModelError(
+                f"{model.path}: scale: no body {name!r}{nearest(name, known)}; expected some of {', '.join(known)}"
+            )
+    return {name: PREFIX + (without_side(name, known) if share else name) for name in chosen}

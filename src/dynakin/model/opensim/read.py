@@ -6,15 +6,16 @@ import re
 from collections import Counter
 from pathlib import Path
 
-from dynakin.model.opensim.bodies import read_body, read_couplers
-from dynakin.model.opensim.description import GROUND, Coordinate, Joint, Marker, Offset, OpenSimModel
+from dynakin.model.opensim.description import GROUND, Body, Coordinate, Coupler, Joint, Marker, Offset, OpenSimModel
 from dynakin.model.opensim.frames import Frames, read_offset
+from dynakin.model.opensim.functions import function_of, joined, polynomial, read_function
 from dynakin.model.opensim.joints import read_axes, read_coordinate
 from dynakin.model.opensim.xml_file import Node, read_xml
 from dynakin.settings.strict import nearest
 
 _OLDEST = 20000  # before that, OpenSim 1's files are built otherwise
 _MOST = 1000  # bodies or joints: whole bodies with fingers and vertebrae have a fifth
+_ENTRIES = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_xz", "inertia_yz")
 _NOT_MECHANICS = {
     "ForceSet": "muscles and other forces",
     "ControllerSet": "controllers",
@@ -43,7 +44,7 @@ def read_osim(path: str | Path) -> OpenSimModel:
         root.fail(f"found version {root.name or 'none'}, expected {_OLDEST} or more (OpenSim 2 to 4)")
     newer = bool(model.objects("JointSet"))
     joints = _joints_4(model) if newer else _joints_3(model)
-    bodies = tuple(read_body(node) for node in model.objects("BodySet") if node.name != GROUND)
+    bodies = tuple(_body(node) for node in model.objects("BodySet") if node.name != GROUND)
     if not bodies:
         model.fail("expected bodies in BodySet")
     _refuse_other_mechanics(model)
@@ -51,7 +52,7 @@ def read_osim(path: str | Path) -> OpenSimModel:
     for name, count in names.items():
         if count > 1:
             model.fail(f"coordinate {name!r} is in two joints")
-    couplers, said = read_couplers(model, set(names))
+    couplers, said = _couplers(model, set(names))
     markers = _markers(model, Frames(model) if newer else None, {GROUND, *(body.name for body in bodies)})
     gravity = model.numbers("gravity", 3, (0.0, -9.80665, 0.0))
     return OpenSimModel(
@@ -164,3 +165,60 @@ def _left_out(model: Node) -> list[str]:
     return (
         [f"Of the OpenSim model left out, as not part of its mechanics: {', '.join(parts)}, geometry."] if parts else []
     )
+
+
+def _body(node: Node) -> Body:
+    """Mass, centre and tensor about the centre: one list of six (version 4) or six elements (version 3)."""
+    mass = node.number("mass", 0.0)
+    if mass < 0.0:
+        node.need("mass").fail(f"found {mass:g} kg, expected 0 or more")
+    x, y, z = node.numbers("mass_center", 3, (0.0, 0.0, 0.0))
+    if node.find("inertia") is not None:
+        entries = node.numbers("inertia", 6)
+    else:
+        entries = [node.number(name, 0.0) for name in _ENTRIES]
+    if mass == 0.0:
+        return Body(node.name, 0.0, (0.0, 0.0, 0.0), (0.0,) * 6)
+    return Body(node.name, mass, (x, y, z), tuple(entries))
+
+
+def _couplers(model: Node, coordinates: set[str]) -> tuple[tuple[Coupler, ...], list[str]]:
+    """Coordinate couplers that are in force, and sentences on the constraints that are switched off.
+
+    Raises:
+        ModelError: another constraint, a function of several coordinates, or an unknown coordinate.
+    """
+    couplers: list[Coupler] = []
+    said: list[str] = []
+    for node in model.objects("ConstraintSet"):
+        if not node.flag("isEnforced", True) or node.flag("isDisabled"):
+            said.append(f"Constraint {node.name} is switched off in the file: left out.")
+            continue
+        if node.tag != "CoordinateCouplerConstraint":
+            node.fail("this kind of constraint is not supported; expected a CoordinateCouplerConstraint")
+        independent = node.word("independent_coordinate_names").split()
+        dependent = node.word("dependent_coordinate_name")
+        if len(independent) != 1:
+            node.fail(f"found {len(independent)} independent coordinates, expected 1")
+        for name in (dependent, *independent):
+            if name not in coordinates:
+                node.fail(f"coordinate {name!r} is in no joint of the model")
+        if any(coupler.dependent == dependent for coupler in couplers):
+            node.fail(f"coordinate {dependent!r} is coupled twice")
+        function = function_of(node.need("coupled_coordinates_function"))
+        if function is None:
+            node.fail("expected a function in coupled_coordinates_function")
+        chain = joined([*read_function(function), polynomial(0.0, node.number("scale_factor", 1.0))])
+        couplers.append(Coupler(node.name, dependent, independent[0], chain))
+    _refuse_circles(model, couplers)
+    return tuple(couplers), said
+
+
+def _refuse_circles(model: Node, couplers: list[Coupler]) -> None:
+    onward = {coupler.dependent: coupler.independent for coupler in couplers}
+    for start in onward:
+        name, steps = start, 0
+        while name in onward:
+            name, steps = onward[name], steps + 1
+            if steps > len(onward):
+                model.need("ConstraintSet").fail(f"coordinate {start!r} is coupled to itself in a circle")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import mean_seen, runs
 from dynakin.recordings.feet.contact import FootContact
 from dynakin.recordings.feet.handover import BOTH_S, STEEPEST_STEP, Span, spans_of, stance_weights, supported
 from dynakin.recordings.recording import Array
@@ -166,7 +166,7 @@ class FootShape:
     def middle(self, points: Array) -> Array:
         """(T, 2) m of the sole among markers (T, K, 2), NaN where its own two are missing."""
         if self.ends is None:
-            return _mean(points)
+            return mean_seen(points, axis=1)
         along = points[:, self.ends[1]] - points[:, self.ends[0]]
         right = np.stack([-along[:, 1], along[:, 0]], axis=1)
         return np.asarray(points[:, self.ends[0]] + self.ahead * along + self.aside * right)
@@ -210,12 +210,6 @@ def _flat_tilt(foot: FootContact, ends: tuple[int, int], rate: float) -> float:
         still = np.abs(np.gradient(tilt)) * rate < STILL_M_S
     flat = foot.touching[:, ends].all(axis=1) & still
     return float(np.median(tilt[flat])) if np.count_nonzero(flat) >= STILL_S * rate else FLAT_TILT_M
-
-
-def _mean(points: Array) -> Array:
-    seen = np.asarray(np.isfinite(points).all(axis=2))
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(seen[..., None], points, 0.0).sum(axis=1) / seen.sum(axis=1, keepdims=True))
 
 
 def _drawn_on(middle: Array, rate: float) -> Array:

@@ -6,7 +6,7 @@ from dynakin.report.findings.finding import Insight, Metrics
 from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import listed, number, plural, sentence
-from dynakin.results.records import doubts_mass
+from dynakin.results.records import WARNING, doubts_mass
 from dynakin.units import GRAVITY_M_S2
 
 # Part of the weight that no contact gives, from which it is said: good recordings leave 0.03 to 0.16 for a frame, one
@@ -44,7 +44,7 @@ def moments(estimate: Estimate, metrics: Metrics) -> Insight | None:
 
 def mass(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """Plates that contradict the mass: forces, moments and inertia are all wrong then."""
-    doubts = [text.removeprefix("Warning: ") for text in estimate.messages if doubts_mass(text)]
+    doubts = [text.removeprefix(WARNING) for text in estimate.messages if doubts_mass(text)]
     if not doubts:
         return None
     return Insight("warning", "Mass", sentence(" ".join(doubts)), "Give the mass as weighed, with all that is worn.")

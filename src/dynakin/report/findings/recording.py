@@ -113,7 +113,7 @@ def _unseen(estimate: Estimate) -> dict[str, str]:
     """Segments, and the times in which none of their markers is seen although some are at other times."""
     segments = estimate.marker_segments
     owners = np.array([segments.get(site, "") for _, site in marker_sites(estimate)])
-    seen = np.isfinite(estimate.data["markers_measured"].transpose("time", "marker", "axis").values).any(axis=2)
+    seen = np.isfinite(estimate.values("markers_measured")).any(axis=2)
     found: dict[str, str] = {}
     for segment in dict.fromkeys(owners[owners != ""]):
         hidden = ~seen[:, owners == segment].any(axis=1)
@@ -143,5 +143,5 @@ def _briefly(estimate: Estimate) -> bool:
     if "verdict" not in estimate.data:
         return False
     frame_s = float(np.median(np.diff(estimate.time)))
-    refused = (estimate.data["verdict"].transpose("time", "sensor").values == REFUSED).sum(axis=0)
+    refused = (estimate.values("verdict") == REFUSED).sum(axis=0)
     return bool(refused.max() * frame_s < BRIEF_S)

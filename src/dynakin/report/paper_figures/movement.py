@@ -29,7 +29,7 @@ from dynakin.report.sections.repetitions import (
     percent_label,
     plots_by_method,
 )
-from dynakin.report.sides import joints_of, side_lines, values_of
+from dynakin.report.sides import joints_of, side_lines
 from dynakin.report.styles import BAND, LineStyle, method_styles, source_key
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import signal_fit
@@ -52,8 +52,8 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
     frames = np.linspace(cycle.start, cycle.stop - 1, _PICTURES).astype(int)
     chain, carriers = chain_of(estimate), estimate.marker_segments
     colours, key = painted(estimate, chain)
-    measured = estimate.data["markers_measured"].values[:, :, :2]
-    estimated = estimate.data["markers_estimated"].values[:, :, :2]
+    measured = estimate.values("markers_measured")[:, :, :2]
+    estimated = estimate.values("markers_estimated")[:, :, :2]
     paint = [colours.get(carriers.get(name, ""), INK) for name in estimate.marker_names]
     shown = np.concatenate([measured[frames], estimated[frames], chain.points[frames][:, :, :2]], axis=1)
     width = max(float(np.nanmax(shown[k, :, 0]) - np.nanmin(shown[k, :, 0])) for k in range(_PICTURES))
@@ -90,7 +90,7 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
 
 def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 5: every free coordinate with its band, right and left over each other, with the classical method's."""
-    values, sd = values_of(estimate, "coordinates"), values_of(estimate, "coordinates_sd")
+    values, sd = estimate.values("coordinates"), estimate.values("coordinates_sd")
     joints = [joint for joint in joints_of(estimate) if np.any(sd[:, list(joint.columns.values())])]
     if not joints:
         return None
@@ -133,7 +133,7 @@ def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
 
 def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 6: the wrench as measured, estimated, and from the table and classical angles ("AT")."""
-    measured, estimated = (values_of(estimate, f"wrench_{kind}") for kind in ("measured", "estimated"))
+    measured, estimated = (estimate.values(f"wrench_{kind}") for kind in ("measured", "estimated"))
     shown = [k for k in range(len(COMPONENTS)) if np.isfinite(estimated[:, k]).any()]
     if not shown:
         return None
@@ -163,7 +163,7 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
 
 def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 7: the moment about each knee, estimated, and from the table and classical angles ("AT")."""
-    moments, names = values_of(estimate, "moments"), estimate.coordinate_names
+    moments, names = estimate.values("moments"), estimate.coordinate_names
     free = sorted(k for joint in joints_of(estimate) for k in joint.columns.values())
     knees = [k for k in free if "knee" in names[k] and np.isfinite(moments[:, k]).any()]
     if not knees:
@@ -177,7 +177,7 @@ def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> F
         name, moment = names[k], moments[:, k]
         draw_sourced(axes, estimate.time, moment, source[:, k], color=ESTIMATED, linewidth=1.2)
         if "moments_sd" in estimate.data:
-            sd = values_of(estimate, "moments_sd")[:, k]
+            sd = estimate.values("moments_sd")[:, k]
             axes.fill_between(estimate.time, moment - 2.0 * sd, moment + 2.0 * sd, color=ESTIMATED, alpha=0.2, lw=0)
         note = moment_note(estimate, name)
         axes.set_title(f"{sentence(words(name))} moment, N m{f' ({note})' if note else ''}")

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.arrays import rms
 from dynakin.elements import element
 from dynakin.report.bars import Bar, share_bars
 from dynakin.report.chart import Bound, Line, Panel, chart
@@ -145,7 +146,7 @@ def _groups(estimate: Estimate, entries: Mapping[str, Mapping[str, Any]]) -> dic
             sizes = _sizes(entry["prior_sd"], entry["sd"], p.unit)
             found.setdefault(sentence(group), []).append(Bar(_label(p, names), entry["share"], sizes))
     for marker, axes in of_marker.items():
-        prior, after = (float(np.sqrt(np.mean([axis[key] ** 2 for axis in axes]))) for key in ("prior_sd", "sd"))
+        prior, after = (float(rms([axis[key] for axis in axes])) for key in ("prior_sd", "sd"))
         label = names.get(recorded.get(marker, marker), marker)
         found.setdefault("Marker places", []).append(Bar(label, after / prior, _sizes(prior, after, "m")))
     return found

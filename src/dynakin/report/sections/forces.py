@@ -11,7 +11,7 @@ from dynakin.report.chart import Line, chart
 from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.sections.section import Page, Section
-from dynakin.report.sides import side_key, values_of
+from dynakin.report.sides import side_key
 from dynakin.report.styles import BAND, ESTIMATED_LINE, MEASURED_LINE, SIDE_COLOURS, source_key
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES, Estimate
@@ -30,7 +30,7 @@ def wrench_section(page: Page) -> Section | None:
     """The total of all plates, measured and estimated."""
     if page.metrics["wrench"] is None:
         return None
-    measured, estimated = (values_of(page.estimate, f"wrench_{kind}") for kind in ("measured", "estimated"))
+    measured, estimated = (page.estimate.values(f"wrench_{kind}") for kind in ("measured", "estimated"))
     source = wrench_sources(page.estimate.data)
     # a planar model's wrench is its own, plates or not; of a body in space only what is measured is compared
     shown = np.isfinite(estimated if page.planar else measured).any(axis=0)
@@ -98,8 +98,8 @@ _NO_FOOT = {NO_CONTACT: "no contact", UNMEASURED: "in contact but not measured"}
 
 def _foot_part(estimate: Estimate, foot: str) -> Section:
     k = estimate.contact_names.index(foot)
-    measured, adjusted = (values_of(estimate, name)[:, k] for name in ("foot_wrench_measured", "foot_wrench"))
-    sd = values_of(estimate, "foot_wrench_sd")[:, k] if "foot_wrench_sd" in estimate.data else None
+    measured, adjusted = (estimate.values(name)[:, k] for name in ("foot_wrench_measured", "foot_wrench"))
+    sd = estimate.values("foot_wrench_sd")[:, k] if "foot_wrench_sd" in estimate.data else None
     contact, source = estimate.data["foot_contact"].sel(foot=foot).values, foot_sources(estimate.data)[:, k]
     panels = []
 
@@ -159,7 +159,7 @@ def mass_centre_section(page: Page) -> Section | None:
         ("mass_centre", 1000.0, "mm", "Place"),
         ("mass_centre_velocity", 1.0, "m/s", "Velocity"),
     ):
-        for values, axis in zip(factor * values_of(page.estimate, variable).T, AXES, strict=True):
+        for values, axis in zip(factor * page.estimate.values(variable).T, AXES, strict=True):
             if np.isfinite(values).any():
                 moved = f"over {number(float(np.ptp(values[np.isfinite(values)])), unit)}"
                 lines, title = [Line(values, ESTIMATED)], f"{what} {DIRECTIONS[axis]}"

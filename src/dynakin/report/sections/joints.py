@@ -9,7 +9,7 @@ import numpy as np
 from dynakin.report.chart import Line, Panel, band_is_too_wide, chart
 from dynakin.report.labels import moment_note
 from dynakin.report.sections.section import Page, Section
-from dynakin.report.sides import REGIONS, Joint, joints_of, normalising_mass, side_key, side_lines, values_of
+from dynakin.report.sides import REGIONS, Joint, joints_of, normalising_mass, side_key, side_lines
 from dynakin.report.styles import BAND, source_key
 from dynakin.results.measures.angles import convention_of
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, UNKNOWN, moment_sources
@@ -19,7 +19,7 @@ from dynakin.results.naming import listed, number, sentence
 def angle_section(page: Page) -> Section:
     """Coordinates with their bands of uncertainty."""
     estimate, lines_of = page.estimate, side_lines(page.estimate)
-    values, sd = values_of(estimate, "coordinates"), values_of(estimate, "coordinates_sd")
+    values, sd = estimate.values("coordinates"), estimate.values("coordinates_sd")
     offset, clinical = np.zeros(values.shape[1]), False
     about = "Each in the direction in which the model counts, from the model’s zero."
     if "zero_offset" in estimate.data:
@@ -65,8 +65,8 @@ def moment_section(page: Page) -> Section:
     """Moments, in space over the body mass; what is derived is dashed, a prior dotted, what is absent left out."""
     estimate, lines_of = page.estimate, side_lines(page.estimate)
     mass = normalising_mass(estimate)
-    moments = values_of(estimate, "moments") / (mass or 1.0)
-    sd = values_of(estimate, "moments_sd") / (mass or 1.0) if "moments_sd" in estimate.data else None
+    moments = estimate.values("moments") / (mass or 1.0)
+    sd = estimate.values("moments_sd") / (mass or 1.0) if "moments_sd" in estimate.data else None
     source, peaks = moment_sources(estimate.data), page.metrics["peak_moments_per_kg"] if mass else None
     found = page.metrics["moments"] or UNKNOWN
 

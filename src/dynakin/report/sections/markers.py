@@ -12,7 +12,6 @@ from dynakin.report.labels import short_marker_names
 from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
 from dynakin.report.sections.forces import DIRECTIONS
 from dynakin.report.sections.section import Page, Section
-from dynakin.report.sides import values_of
 from dynakin.report.styles import ESTIMATED_LINE, MEASURED_LINE, LineStyle
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES
@@ -30,7 +29,7 @@ def marker_section(page: Page) -> Section | None:
         return None
     names = short_marker_names(page.estimate.marker_names)
     rms = {names[name]: value for name, value in page.metrics["markers"]["rms_mm"].items()}
-    measured, estimated = (values_of(page.estimate, f"markers_{kind}") for kind in ("measured", "estimated"))
+    measured, estimated = (page.estimate.values(f"markers_{kind}") for kind in ("measured", "estimated"))
     window = page.metrics["window"]
     span = f"between {window['start_s']:.4g} and {window['end_s']:.4g} s."
     if page.planar:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynakin.report.chart import Line, Panel, chart
 from dynakin.report.sections.section import Page, Section
-from dynakin.report.sides import Joint, joints_of, normalising_mass, side_key, side_lines, values_of
+from dynakin.report.sides import Joint, joints_of, normalising_mass, side_key, side_lines
 from dynakin.report.styles import source_key
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
@@ -124,7 +124,7 @@ def _compared(found: Mapping[str, Any]) -> str:
 
 def _too_small(estimate: Estimate, metrics: dict[str, Any], joints: list[Joint]) -> set[tuple[str, str]]:
     """(stem, quantity) whose larger side is a small part of the body's largest."""
-    values, moments = values_of(estimate, "coordinates"), measured_moments(estimate.data)
+    values, moments = estimate.values("coordinates"), measured_moments(estimate.data)
     sizes: dict[str, dict[str, float]] = {"range": {}, "peak_moment": {}, "positive_work": {}, "negative_work": {}}
     for joint in joints:
         columns = list(joint.columns.values())

@@ -61,7 +61,7 @@ def write_mass_centre(estimate: Estimate, path: Path) -> None:
     """``centre_of_mass.sto``: ``com_x`` ... m, ``com_vx`` ... m/s, ground frame; modelled axes only."""
     names, columns = [], []
     for variable, prefix in (("mass_centre", "com_"), ("mass_centre_velocity", "com_v")):
-        values = estimate.data[variable].transpose("time", "axis").values
+        values = estimate.values(variable)
         for k in np.flatnonzero(estimate.modelled_axes()):
             names.append(prefix + AXES[k])
             columns.append(values[:, k])
@@ -99,8 +99,8 @@ def write_joint_reactions(estimate: Estimate, path: Path) -> None:
     ``knee_on_shank_in_ground_fx`` ... ``_mz`` N and N m about the joint's centre, ``_px`` ... m: the centre. The model
     loads a segment through the joint by which it hangs: force and moment of its parent on it, muscles included.
     """
-    values = estimate.data["joint_loads"].transpose("time", "joint", "component").values
-    centres = estimate.data["joint_centres"].transpose("time", "joint", "axis").values
+    values = estimate.values("joint_loads")
+    centres = estimate.values("joint_centres")
     axes = estimate.modelled_axes()
     names, columns = [], []
     joints = zip(estimate.data["joint"].values, estimate.data["joint_segment"].values, strict=True)

@@ -20,7 +20,7 @@ def laboratory_markers(estimate: Estimate) -> np.ndarray:
     axis as measured. Where the marker was not measured such a point is not known in the laboratory and is NaN; its
     in-plane estimate is in ``estimate.nc``.
     """
-    estimated = estimate.data["markers_estimated"].transpose("time", "marker", "axis").values
+    estimated = estimate.values("markers_estimated")
     if estimate.modelled_axes().all():
         return np.asarray(estimated)
     recording = estimate.recording

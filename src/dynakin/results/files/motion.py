@@ -82,7 +82,7 @@ def write_moments(estimate: Estimate, path: Path) -> None:
         "Inverse Dynamics Generalized Forces",
         estimate.time,
         moment_columns(estimate),
-        estimate.data["moments"].transpose("time", "coordinate").values,
+        estimate.values("moments"),
         in_degrees=False,
         notes=[
             "Moments in N m, forces in N. In a model that lumps both sides, leg moments are the sum of both legs.",
@@ -119,15 +119,15 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
             columns.append(_in_degrees(estimate, f"{variable}_sd")[:, seen])
     if "moments_sd" in estimate.data:
         names += moment_columns(estimate)
-        deviations = estimate.data["moments_sd"].transpose("time", "coordinate").values
+        deviations = estimate.values("moments_sd")
         columns.append(np.where(moment_sources(estimate.data) == ABSENT, np.nan, deviations))
     if "wrench_sd" in estimate.data:
-        values = estimate.data["wrench_sd"].transpose("time", "component").values
+        values = estimate.values("wrench_sd")
         known = np.isfinite(values).any(axis=0)
         names += [name for name, seen in zip(COMPONENTS, known, strict=True) if seen]
         columns.append(values[:, known])
     if "foot_wrench_sd" in estimate.data:
-        forces = estimate.data["foot_wrench_sd"].transpose("time", "foot", "component").values[:, :, :3]
+        forces = estimate.values("foot_wrench_sd")[:, :, :3]
         forces = np.where((foot_sources(estimate.data) == ABSENT)[:, :, None], np.nan, forces)
         names += [f"{force_stem(foot)}_v{axis}" for foot in estimate.contact_names for axis in AXES]
         columns.append(forces.reshape(len(forces), -1))
@@ -157,7 +157,7 @@ def write_wrench(estimate: Estimate, path: Path) -> None:
     names: list[str] = []
     columns: list[np.ndarray] = []
     for kind in ("measured", "estimated"):
-        values = estimate.data[f"wrench_{kind}"].transpose("time", "component").values
+        values = estimate.values(f"wrench_{kind}")
         for index, component in enumerate(COMPONENTS):
             if np.isfinite(values[:, index]).any():
                 names.append(f"{component}_{kind}")
@@ -184,7 +184,7 @@ def _frame(estimate: Estimate) -> str:
 
 
 def _in_degrees(estimate: Estimate, variable: str) -> np.ndarray:
-    values = estimate.data[variable].transpose("time", "coordinate").values.astype(float, copy=True)
+    values = estimate.values(variable).astype(float, copy=True)
     rotation = estimate.is_rotation()
     values[:, rotation] = np.degrees(values[:, rotation])
     return values

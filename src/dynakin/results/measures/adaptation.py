@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from dynakin.arrays import rms, rms_length
 from dynakin.results.estimate import Estimate
 from dynakin.results.records import Parameter
 from dynakin.units import COMPONENTS
@@ -60,7 +61,7 @@ def misfit_settling(time: np.ndarray, misfit: np.ndarray) -> Settling:
         time: (T,) s, evenly spaced. misfit: (T,) in any unit; NaN where nothing was measured.
     """
     half = len(time) // 2
-    early, level = _rms(misfit[:half]), _rms(misfit[half:])
+    early, level = (float(rms(part[np.isfinite(part)])) for part in (misfit[:half], misfit[half:]))
     running = running_rms(misfit, max(1, round(RUNNING_S / float(np.median(np.diff(time))))))
     growth = level / early if early > 0.0 else 1.0
     if not np.isfinite(level) or growth > FACTOR:
@@ -130,14 +131,9 @@ def _after(time: np.ndarray, outside: np.ndarray) -> float | None:
     return after if after <= LATEST * (time[-1] - time[0]) else None
 
 
-def _rms(values: np.ndarray) -> float:
-    seen = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(seen**2))) if len(seen) else float("nan")
-
-
 def _group(estimate: Estimate, group: list[Parameter]) -> dict[str, Any]:
     elements = [str(name) for name in estimate.data["element"].values]
-    state = estimate.data["state"].transpose("time", "element").values
+    state = estimate.values("state")
     after = {
         p.name: constant_settling(estimate.time, state[:, elements.index(p.name)], band_of(p)).after_s for p in group
     }
@@ -153,10 +149,7 @@ def _misfits(estimate: Estimate) -> dict[str, np.ndarray]:
     markers = (estimate.data["markers_measured"] - estimate.data["markers_estimated"]).transpose(
         "time", "marker", "axis"
     )
-    squares = np.sum(markers.values[:, :, axes] ** 2, axis=2)
-    seen = np.isfinite(squares)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        distance = np.sqrt(np.where(seen, squares, 0.0).sum(axis=1) / seen.sum(axis=1))
+    distance = rms_length(markers.values[:, :, axes], axis=1)
     wrench = (estimate.data["wrench_measured"] - estimate.data["wrench_estimated"]).transpose("time", "component")
     found = {"markers": distance} | {name: wrench.values[:, k] for k, name in enumerate(COMPONENTS)}
     return {name: path for name, path in found.items() if np.isfinite(path).any()}
@@ -231,7 +224,7 @@ def convergence(estimate: Estimate) -> list[Convergence]:
 def _judge(estimate: Estimate, title: str, group: list[Parameter]) -> Convergence:
     moving, left, largest = [], [], 0.0
     at = {str(name): k for k, name in enumerate(estimate.data["element"].values)}
-    states, deviations = (estimate.data[name].transpose("time", "element").values for name in ("state", "state_sd"))
+    states, deviations = (estimate.values(name) for name in ("state", "state_sd"))
     for p in group:
         path = states[:, at[p.name]]
         late = path[3 * len(path) // 4 :]

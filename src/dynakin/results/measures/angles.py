@@ -86,7 +86,7 @@ def angle_columns(estimate: Estimate) -> tuple[list[str], Array, list[str]]:
     from dynakin.results.measures.facing import facing
 
     estimate = facing(estimate)
-    values = np.degrees(estimate.data["coordinates"].transpose("time", "coordinate").values)
+    values = np.degrees(estimate.values("coordinates"))
     offset = np.degrees(estimate.data["zero_offset"].values)
     clinical = estimate.data.attrs["angle_signs"] == "clinical"
     names, columns, lines = [], [], []

@@ -22,7 +22,7 @@ ON_THE_BOUND = 1e-9
 def bound_shares(estimate: Estimate, window: np.ndarray) -> dict[str, float]:
     """Share of the frames ``window`` (T,) bool that each estimated parameter with bounds spends on one of them."""
     elements = {str(name): k for k, name in enumerate(estimate.data["element"].values)}
-    state = estimate.data["state"].transpose("time", "element").values[window]
+    state = estimate.values("state")[window]
     shares = {}
     for p in estimate.parameters:
         if not p.estimated or (p.lower is None and p.upper is None):

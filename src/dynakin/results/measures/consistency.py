@@ -19,6 +19,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from scipy.special import gammaincinv
 
+from dynakin.arrays import rms
 from dynakin.results.naming import listed
 
 Judgement = Literal["overconfident", "consistent", "conservative"]
@@ -262,14 +263,7 @@ def speed_mismatch(time: np.ndarray, coordinates: np.ndarray, speeds: np.ndarray
     if len(time) < 3:
         return np.full(coordinates.shape[1], np.nan), np.full(coordinates.shape[1], np.nan)
     derivative = np.gradient(coordinates, time, axis=0)
-    return _rms(speeds - derivative), _rms(derivative)
-
-
-def _rms(values: np.ndarray) -> np.ndarray:
-    """Of each column, frames without a number left out."""
-    known = np.isfinite(values)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.sqrt(np.sum(np.where(known, values, 0.0) ** 2, axis=0) / known.sum(axis=0)))
+    return rms(speeds - derivative, axis=0), rms(derivative, axis=0)
 
 
 def mismatch_in_words(names: list[str], rotation: np.ndarray, mismatch: np.ndarray, moving: np.ndarray) -> str:

@@ -77,7 +77,7 @@ def _pelvis(estimate: Estimate, turn: Array) -> Array | None:
         return None
     segment = str(estimate.data["coordinate_segment"].sel(coordinate=PELVIS[0]).values)
     at = [str(name) for name in estimate.data["joint_segment"].values].index(segment)
-    R_GB = estimate.data["joint_orientations"].transpose("time", "joint", "axis", "axis_").values[:, at]
+    R_GB = estimate.values("joint_orientations")[:, at]
     own = estimate.data["coordinates"].sel(coordinate=list(PELVIS)).transpose("time", "coordinate").values
     known = np.isfinite(R_GB).all(axis=(1, 2))
     rotation = scipy.spatial.transform.Rotation

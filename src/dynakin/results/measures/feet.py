@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms, wrench_about
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
-from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.measures import sources
 from dynakin.results.naming import plural
 from dynakin.units import COMPONENTS, GRAVITY_M_S2
@@ -24,8 +26,8 @@ FLIGHT = 0.05
 
 def foot_sources(data: xr.Dataset) -> sources.Codes:
     """(T, F) codes of `results.measures.sources` of the feet's wrenches; in the air they are known to be zero."""
-    known = np.isfinite(data["foot_wrench"].transpose("time", "foot", "component").values).all(axis=2)
-    return np.where(known, data["foot_source"].transpose("time", "foot").values, sources.ABSENT).astype(np.uint8)
+    known = np.isfinite(values_of(data, "foot_wrench")).all(axis=2)
+    return np.where(known, values_of(data, "foot_source"), sources.ABSENT).astype(np.uint8)
 
 
 def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, Any] | None:
@@ -41,29 +43,25 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     """
     if not estimate.foot_names or "foot_wrench" not in estimate.data:
         return None
-    contact = estimate.data["foot_contact"].transpose("time", "foot").values[window]
-    adjusted = estimate.data["foot_adjustment"].transpose("time", "foot", "component").values[window]
-    adjusted = np.concatenate(
-        [adjusted[..., :3], adjusted[..., 3:] - np.cross(_joints(estimate)[window], adjusted[..., :3])], axis=-1
-    )
-    remainder = estimate.data["wrench_remainder"].transpose("time", "component").values[window]
+    contact = estimate.values("foot_contact")[window]
+    adjusted = estimate.values("foot_adjustment")[window]
+    adjusted = wrench_about(adjusted, _joints(estimate)[window])
+    remainder = estimate.values("wrench_remainder")[window]
     codes = foot_sources(estimate.data)[window]
     given = np.isfinite(remainder).all(axis=1)
     flight = (contact == NO_CONTACT).all(axis=1) & given
     grounded = (contact != UNMEASURED).all(axis=1) & (contact != NO_CONTACT).any(axis=1) & given
     grounded &= _nothing_else_bears(estimate)[window]
     known = (contact == ON_PLATE) & grounded[:, None] & np.isfinite(adjusted).all(axis=2)  # not where it is lost
-    rms = {
-        name: dict(zip(COMPONENTS, _rms(adjusted[known[:, k], k]), strict=True)) if known[:, k].any() else None
+    adjustment = {
+        name: _rms(COMPONENTS, adjusted[known[:, k], k]) if known[:, k].any() else None
         for k, name in enumerate(estimate.foot_names)
     }
-    about_root = np.concatenate(
-        [remainder[:, :3], remainder[:, 3:] - np.cross(_root(estimate)[window], remainder[:, :3])], axis=-1
-    )
+    about_root = wrench_about(remainder, _root(estimate)[window])
     left = {"grounded": _largest(about_root[grounded]), "flight": _largest(about_root[flight])}
     figures = {
-        "adjustment_rms": rms,
-        "remainder_rms": dict(zip(COMPONENTS, _rms(remainder[flight]), strict=True)) if flight.any() else None,
+        "adjustment_rms": adjustment,
+        "remainder_rms": _rms(COMPONENTS, remainder[flight]) if flight.any() else None,
         "flight_frames": int(flight.sum()),
         "derived_frames": int((codes == sources.DERIVED).any(axis=1).sum()),
         "prior_frames": int((codes == sources.PRIOR).any(axis=1).sum()),
@@ -87,9 +85,7 @@ def contact_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[s
         own = estimate.data.sel(foot=name)
         bears = window & (own["foot_contact"].values != NO_CONTACT)
         codes = foot_sources(estimate.data)[bears, estimate.contact_names.index(name)]
-        force, sd = (
-            own[key].transpose("time", "component").values[bears, :3] for key in ("foot_wrench", "foot_wrench_sd")
-        )
+        force, sd = (values_of(own, key)[bears, :3] for key in ("foot_wrench", "foot_wrench_sd"))
         known = np.isfinite(force).all(axis=1)
         counts = {what: int(np.sum(codes == code)) for code, what in enumerate(sources.MEANINGS)}
         axes, some = COMPONENTS[:3], bool(known.any())
@@ -98,7 +94,7 @@ def contact_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[s
             **counts,
             "force_n": dict(zip(axes, force[known].mean(axis=0).tolist(), strict=True)) if some else None,
             "largest_n": float(np.linalg.norm(force[known], axis=1).max()) if some else None,
-            "sd_n": dict(zip(axes, _rms(sd[known]), strict=True)) if some else None,
+            "sd_n": _rms(axes, sd[known]) if some else None,
         }
     return found
 
@@ -107,13 +103,13 @@ def _joints(estimate: Estimate) -> np.ndarray:
     """(T, F, 3) m: where each foot's segment hangs."""
     segments = [str(name) for name in estimate.data["joint_segment"].values]
     own = [segments.index(str(name)) for name in estimate.data["foot_segment"].values]
-    return np.asarray(estimate.data["joint_centres"].transpose("time", "joint", "axis").values[:, own])
+    return estimate.values("joint_centres")[:, own]
 
 
 def _root(estimate: Estimate) -> np.ndarray:
     """(T, 3) m: the joint by which the body hangs on the ground."""
     root = int(np.flatnonzero(estimate.data["joint_parent"].values < 0)[0])
-    return np.asarray(estimate.data["joint_centres"].transpose("time", "joint", "axis").values[:, root])
+    return estimate.values("joint_centres")[:, root]
 
 
 def _nothing_else_bears(estimate: Estimate) -> npt.NDArray[np.bool_]:
@@ -126,8 +122,8 @@ def _nothing_else_bears(estimate: Estimate) -> npt.NDArray[np.bool_]:
     return np.asarray((sources.moment_sources(data)[:, own] != sources.ABSENT).all(axis=1))
 
 
-def _rms(values: np.ndarray) -> list[float]:
-    return [float(v) for v in np.sqrt(np.mean(values**2, axis=0))]
+def _rms(names: Sequence[str], values: np.ndarray) -> dict[str, float]:
+    return dict(zip(names, rms(values, axis=0).tolist(), strict=True))
 
 
 def _largest(wrench: np.ndarray) -> dict[str, float] | None:

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dynakin.arrays import rms, rms_length
+
 
 def marker_rms_mm(measured: np.ndarray, estimated: np.ndarray, axes: np.ndarray) -> float | None:
     """Root mean square distance of one marker, mm, over the frames where it is measured and estimated.
@@ -19,7 +21,7 @@ def marker_rms_mm(measured: np.ndarray, estimated: np.ndarray, axes: np.ndarray)
     seen = np.isfinite(difference).all(axis=1)
     if not seen.any():
         return None
-    return float(1000.0 * np.sqrt(np.mean(np.sum(difference[seen] ** 2, axis=1))))
+    return 1000.0 * float(rms_length(difference[seen]))
 
 
 class SignalFit(NamedTuple):
@@ -58,12 +60,12 @@ def signal_fit(measured: np.ndarray, estimated: np.ndarray) -> SignalFit:
     if not seen.any():
         return SignalFit(None, None, None, None)
     a, b = measured[seen], estimated[seen]
-    rms, size, span = float(np.sqrt(np.mean((a - b) ** 2))), float(np.sqrt(np.mean(a**2))), float(np.ptp(a))
+    off, size, span = float(rms(a - b)), float(rms(a)), float(np.ptp(a))
     constant = span == 0.0 or np.ptp(b) == 0.0
     return SignalFit(
-        rms,
-        100.0 * rms / size if size > 0.0 else None,
-        100.0 * rms / span if span > 0.0 else None,
+        off,
+        100.0 * off / size if size > 0.0 else None,
+        100.0 * off / span if span > 0.0 else None,
         None if constant else float(np.corrcoef(a, b)[0, 1]),
     )
 
@@ -78,4 +80,4 @@ def truth_error(truth: np.ndarray, estimated: np.ndarray) -> TruthError:
     error = error[np.isfinite(error)]
     if not len(error):
         return TruthError(None, None, None)
-    return TruthError(float(np.sqrt(np.mean(error**2))), float(np.mean(error)), float(np.std(error)))
+    return TruthError(float(rms(error)), float(np.mean(error)), float(np.std(error)))

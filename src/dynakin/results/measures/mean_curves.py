@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.repetitions import Movement, Repetition, repetitions_of
 from dynakin.results.measures.sources import measured_moments, measured_wrench
@@ -152,12 +152,12 @@ def estimate_curves(estimate: Estimate) -> list[MeanCurve]:
     estimate = facing(estimate)
     preset = estimate.config.get("preset")
     data = estimate.data
-    coordinates = data["coordinates"].transpose("time", "coordinate").values
+    coordinates = values_of(data, "coordinates")
     own = (coordinates, measured_moments(data), measured_wrench(data))
     names, rotation = estimate.coordinate_names, estimate.is_rotation()
     methods = {
         f"EKF ({preset})" if preset else "EKF": signals(names, rotation, *own),
-        MEASURED: signals(names, rotation, wrench=data["wrench_measured"].transpose("time", "component").values),
+        MEASURED: signals(names, rotation, wrench=values_of(data, "wrench_measured")),
     }
     repetitions = repetitions_of(estimate).items
     return mean_curves(estimate.time, repetitions, methods, float(estimate.config.get("mass_kg") or np.nan))

@@ -166,7 +166,7 @@ def window_consistency(estimate: Estimate, window: np.ndarray) -> Consistency:
         pairs[name] = (_array(estimate, f"{name}_innovation") if kept else off)[window], sd
     markers, sd = pairs["markers"]
     if sd is not None:
-        refused = estimate.data["verdict"].transpose("time", "sensor").values[window, :-1] == REFUSED
+        refused = estimate.values("verdict")[window, :-1] == REFUSED
         sd = np.where(refused[:, :, None], np.nan, sd)[:, :, axes].reshape(len(sd), -1)
     return consistency(
         estimate.time[window],
@@ -181,7 +181,7 @@ def window_consistency(estimate: Estimate, window: np.ndarray) -> Consistency:
 def speed_consistency(estimate: Estimate, window: np.ndarray) -> tuple[dict[str, float], str]:
     """How far each speed is from the derivative of its coordinate, and a sentence, empty where all fit."""
     names = estimate.coordinate_names
-    values = (estimate.data[name].transpose("time", "coordinate").values[window] for name in ("coordinates", "speeds"))
+    values = (estimate.values(name)[window] for name in ("coordinates", "speeds"))
     mismatch, moving = speed_mismatch(estimate.time[window], *values)
     finite = {name: float(value) for name, value in zip(names, mismatch, strict=True) if np.isfinite(value)}
     return finite, mismatch_in_words(names, estimate.is_rotation(), mismatch, moving)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import wrench_about
 from dynakin.recordings.plates.pressure import LOADED_N, Surface
 from dynakin.recordings.plates.pressure import centre_of_pressure as recorded_pressure
 from dynakin.recordings.plates.surfaces import SAME_LEVEL_M, surface_height
@@ -29,7 +30,7 @@ def centre_of_pressure(wrench: Array, height_m: float | Array, threshold_n: floa
     known = np.isfinite(wrench)
     filled = np.where(known, wrench, 0.0)
     up = np.zeros(3) + np.asarray(height_m)[..., None] * [0.0, 1.0, 0.0]
-    force, moment = filled[..., :3], filled[..., 3:] - np.cross(up, filled[..., :3])  # about the plane's own origin
+    force, moment = np.split(wrench_about(filled, up), 2, axis=-1)  # about the plane's own origin
     point, free = recorded_pressure(force, moment, Surface(np.zeros(3), np.array([0.0, 1.0, 0.0])), threshold_n)
     in_plane, across = known[..., [0, 1, 5]].all(axis=-1), known[..., 1:4].all(axis=-1)
     pushed = known[..., 1] & (filled[..., 1] >= threshold_n)

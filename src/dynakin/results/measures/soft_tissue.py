@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.arrays import rms
 from dynakin.elements import element
 from dynakin.recordings.landmarks import plain_name
 from dynakin.results.estimate import AXES, Estimate
@@ -57,7 +58,7 @@ def displacements(estimate: Estimate, window: np.ndarray) -> dict[str, MarkerDis
     blocks = [state_paths(estimate, block) for block in ("marker", "soft_tissue")]
     initial = {p.name: p.initial for p in estimate.parameters}
     segments = estimate.marker_segments
-    measured = estimate.data["markers_measured"].transpose("time", "marker", "axis").values
+    measured = estimate.values("markers_measured")
     seen = np.isfinite(measured[:, :, estimate.modelled_axes()]).all(axis=2)
     found = {}
     for k, (name, site) in enumerate(marker_sites(estimate)):
@@ -73,7 +74,7 @@ def displacements(estimate: Estimate, window: np.ndarray) -> dict[str, MarkerDis
         offset = float(np.linalg.norm(moved.mean(axis=0) - start))
         found[name] = MarkerDisplacement(
             segment,
-            float(np.sqrt(np.mean(distance**2))),
+            float(rms(distance)),
             float(distance.max()),
             offset if np.isfinite(offset) else None,
             size,
@@ -147,7 +148,7 @@ def _axes(blocks: list[dict[str, dict[str, np.ndarray]]], site: str) -> list[str
 
 def state_paths(estimate: Estimate, block: str) -> dict[str, dict[str, np.ndarray]]:
     """Site -> axis -> (T,) m of the state's elements ``block/SITE/AXIS``."""
-    state = estimate.data["state"].transpose("time", "element").values
+    state = estimate.values("state")
     paths: dict[str, dict[str, np.ndarray]] = {}
     for k, name in enumerate(str(name) for name in estimate.data["element"].values):
         kind, site, axis = element(name)

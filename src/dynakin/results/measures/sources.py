@@ -15,8 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.recordings.feet.contact import SHARED_PLATE, UNMEASURED
-from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.naming import listed, sentence, words
+from dynakin.results.records import WARNING
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,10 +74,10 @@ def contact_sources(contact: Codes, undeclared: npt.NDArray[np.bool_] | None = N
 def wrench_sources(data: xr.Dataset) -> Codes:
     """(T, 6) of the estimated total wrench: derived from the motion alone where the plates do not measure it. How
     contacts divide it does not matter, so no prior is in it."""
-    estimated = data["wrench_estimated"].transpose("time", "component").values
+    estimated = values_of(data, "wrench_estimated")
     codes = np.zeros(estimated.shape, dtype=np.uint8)
     if "wrench_measured" in data:
-        codes[np.isnan(data["wrench_measured"].transpose("time", "component").values)] = DERIVED
+        codes[np.isnan(values_of(data, "wrench_measured"))] = DERIVED
     codes[np.isnan(estimated)] = ABSENT
     return codes
 
@@ -88,12 +89,12 @@ def measured_only(values: Array, sources: Codes) -> Array:
 
 def measured_moments(data: xr.Dataset) -> Array:
     """(T, C) N m or N, NaN where they are not measured."""
-    return measured_only(data["moments"].transpose("time", "coordinate").values, moment_sources(data))
+    return measured_only(values_of(data, "moments"), moment_sources(data))
 
 
 def measured_wrench(data: xr.Dataset) -> Array:
     """(T, 6) N and N m: the estimated total wrench, NaN where the plates do not measure it."""
-    return measured_only(data["wrench_estimated"].transpose("time", "component").values, wrench_sources(data))
+    return measured_only(values_of(data, "wrench_estimated"), wrench_sources(data))
 
 
 def legs_of(data: xr.Dataset) -> list[str]:
@@ -166,7 +167,7 @@ def source_figures(data: xr.Dataset, sources: Codes, reasons: Sequence[str]) -> 
     legs = {name: _count(sources[:, columns].max(axis=1)) for name, columns in groups.items()}
     why: list[str] = []
     if any(count["measured"] < len(sources) for count in legs.values()):
-        why = [sentence(text.removeprefix("Warning: ")) for text in reasons]
+        why = [sentence(text.removeprefix(WARNING)) for text in reasons]
     names = [str(name) for name in data["coordinate"].values]
     moving = {str(name) for name in data["element"].values}
     spoken = {leg: [k for k in own if names[k] in moving] or own for leg, own in groups.items()}  # not of locked joints

@@ -53,7 +53,7 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
         ``stances``: how many of each foot were compared, None where the window was. ``reason``: why legs are not.
     """
     time = estimate.time
-    angles = estimate.data["coordinates"].transpose("time", "coordinate").values[window]
+    angles = estimate.values("coordinates")[window]
     moments = sources.measured_moments(estimate.data)
     power = sources.measured_only(estimate.powers(), sources.moment_sources(estimate.data))
     stances, legs = compared_stances(estimate, window), sources.legs_of(estimate.data)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import rms, runs
 from dynakin.errors import LostError
-from dynakin.results.estimate import AXES, Estimate
+from dynakin.results.estimate import AXES, Estimate, values_of
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
 from dynakin.results.measures.sources import ABSENT
 from dynakin.results.naming import listed, sentence
@@ -52,9 +52,9 @@ def tracking_of(estimate: Estimate) -> Tracking:
     data, axes = estimate.data, estimate.modelled_axes()
     gaps = (data["markers_measured"] - data["markers_estimated"]).transpose("time", "marker", "axis").values
     distance = np.linalg.norm(gaps[:, :, axes], axis=2) + _skin(estimate)
-    seen = np.isfinite(data["markers_measured"].transpose("time", "marker", "axis").values[:, :, axes]).all(axis=2)
+    seen = np.isfinite(values_of(data, "markers_measured")[:, :, axes]).all(axis=2)
     count = seen.shape[1]
-    verdict = data["verdict"].transpose("time", "sensor").values[:, :count] if "verdict" in data else np.ones_like(seen)
+    verdict = values_of(data, "verdict")[:, :count] if "verdict" in data else np.ones_like(seen)
     refused = (verdict == REFUSED) & seen
     astray = seen & ~(distance <= ASTRAY_M)
     n = np.maximum(seen.sum(axis=1), 1)
@@ -166,7 +166,7 @@ def tracking_figures(estimate: Estimate) -> dict[str, Any] | None:
     if found is None:
         return None
     seen = np.isfinite(found.distance_m)
-    rms = np.sqrt(np.nanmean(np.where(seen, found.distance_m, np.nan)[found.measured] ** 2, axis=1))
+    distance_m = rms(found.distance_m[found.measured], axis=1)
     refused = found.refused.sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
     return {
         "what": "distance of all measured markers from where the bones carry them (RMS over markers, skin in it), mm; "
@@ -175,8 +175,8 @@ def tracking_figures(estimate: Estimate) -> dict[str, Any] | None:
         "lost_share": lost_share(found),
         "trial_lost": why_lost(estimate) is not None,
         "unmeasured_frames": int(np.sum(~found.measured)),
-        "distance_median_mm": float(1000.0 * np.median(rms)) if len(rms) else None,
-        "distance_largest_mm": float(1000.0 * np.max(rms)) if len(rms) else None,
+        "distance_median_mm": float(1000.0 * np.median(distance_m)) if len(distance_m) else None,
+        "distance_largest_mm": float(1000.0 * np.max(distance_m)) if len(distance_m) else None,
         "refused_largest_share": float(refused.max()),
         "verdict": sentence(in_words(estimate, found)) if found.lost.any() else "",
     }

@@ -19,11 +19,9 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
-from dynakin.studies.engine.folder import writing
-from dynakin.studies.engine.journal import Journal
-from dynakin.studies.engine.pools import Pool
+from dynakin.studies.engine.journal import Journal, writing
+from dynakin.studies.engine.pools import Pool, work
 from dynakin.studies.engine.tasks import Failure, Task
-from dynakin.studies.engine.work import work
 from dynakin.units import COMPONENTS
 from dynakin.validation.case import case_of
 from dynakin.validation.files import flat

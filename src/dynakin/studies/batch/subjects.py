@@ -20,9 +20,8 @@ from dynakin.settings import presets
 from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
 from dynakin.studies.engine.journal import Journal
-from dynakin.studies.engine.pools import Pool
+from dynakin.studies.engine.pools import Pool, work
 from dynakin.studies.engine.tasks import Outcome, Task
-from dynakin.studies.engine.work import work
 from dynakin.validation.case import case_of
 
 FILE = "subject.toml"

@@ -4,8 +4,7 @@ It knows nothing of filters: a task is a function of something that all share an
 """
 
 from dynakin.studies.engine.journal import Journal
-from dynakin.studies.engine.pools import BACKENDS, Pool, open_pool
+from dynakin.studies.engine.pools import BACKENDS, Pool, open_pool, work
 from dynakin.studies.engine.tasks import Failure, Outcome, Task
-from dynakin.studies.engine.work import work
 
 __all__ = ["BACKENDS", "Failure", "Journal", "Outcome", "Pool", "Task", "open_pool", "work"]

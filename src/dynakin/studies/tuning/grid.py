@@ -16,9 +16,8 @@ from dynakin.results.files.config import versions
 from dynakin.settings.effect import check_effect
 from dynakin.settings.noise import Noise
 from dynakin.studies.engine.journal import Journal
-from dynakin.studies.engine.pools import Pool
+from dynakin.studies.engine.pools import Pool, work
 from dynakin.studies.engine.tasks import Task
-from dynakin.studies.engine.work import work
 from dynakin.studies.tuning.score import CRITERIA, Shared, score_task
 from dynakin.studies.tuning.settings import check_setting
 from dynakin.units import COMPONENTS

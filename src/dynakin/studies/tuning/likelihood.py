@@ -10,9 +10,8 @@ import numpy.typing as npt
 
 from dynakin.errors import DynakinError
 from dynakin.studies.engine.journal import Journal
-from dynakin.studies.engine.pools import Pool
+from dynakin.studies.engine.pools import Pool, work
 from dynakin.studies.engine.tasks import Row, Task
-from dynakin.studies.engine.work import work
 from dynakin.studies.tuning.grid import mean_row
 from dynakin.studies.tuning.score import Shared, score_task
 from dynakin.studies.tuning.settings import together, value_of

@@ -12,7 +12,7 @@ from dynakin.files import write_csv, write_json
 from dynakin.results.files.config import versions
 from dynakin.settings.noise import SCALES
 from dynakin.settings.presets import write_preset
-from dynakin.studies.engine.folder import writing
+from dynakin.studies.engine.journal import writing
 from dynakin.studies.tuning.fit import Fit
 from dynakin.studies.tuning.grid import Grid
 from dynakin.studies.tuning.score import CRITERIA

@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms_length, wrench_about
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.smoothing import MAX_GAP_S, even_step, fill_gaps, smooth
+from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import ABSENT, MEASURED
 from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse_kinematics
 
@@ -131,7 +133,7 @@ def with_plates(motion: RigidMotion, estimated: xr.Dataset) -> tuple[xr.Dataset,
     external, sources = _on_segments(motion.model, estimated), None
     moments = motion.moments(external)
     if "moment_source" in estimated:
-        sources = estimated["moment_source"].transpose("time", "coordinate").values
+        sources = values_of(estimated, "moment_source")
         sources = np.where((sources == MEASURED) & np.isfinite(moments), MEASURED, ABSENT).astype(np.uint8)
         moments = np.where(sources == MEASURED, moments, np.nan)
     wrench, (orientations, origins) = motion.wrench(), motion.poses()
@@ -156,13 +158,12 @@ def with_plates(motion: RigidMotion, estimated: xr.Dataset) -> tuple[xr.Dataset,
     notes = [f"{missing} frames have no posture: too few markers for more than {MAX_GAP_S:g} s."] if missing else []
     if external is None:
         return data, notes
-    measured = estimated["wrench_measured"].transpose("time", "component").values
-    force, moment = np.split(measured - wrench, 2, axis=1)
-    moment = moment - np.cross(origins[:, 0], force)
+    measured = values_of(estimated, "wrench_measured")
+    force, moment = np.split(wrench_about(measured - wrench, origins[:, 0]), 2, axis=1)
     known = np.isfinite(force).all(axis=1) & np.isfinite(moment).all(axis=1)
     if not known.any():
         return data, [*notes, "The plates nowhere measure the whole: the residual is not known."]
-    sizes = [float(np.sqrt(np.mean(np.sum(part[known] ** 2, axis=1)))) for part in (force, moment)]
+    sizes = [float(rms_length(part[known])) for part in (force, moment)]
     return data, [
         *notes,
         f"What it leaves at the {motion.model.segment_names[0]}: {sizes[0]:.1f} N and {sizes[1]:.1f} N m "
@@ -174,7 +175,7 @@ def _on_segments(model: _core.Model, estimated: xr.Dataset) -> Array | None:
     """External wrenches (T, S, 6) of the plates, 0 where none is measured; None of a model that stands on its root."""
     if "foot_wrench_measured" not in estimated:
         return None
-    wrenches = np.nan_to_num(estimated["foot_wrench_measured"].transpose("time", "foot", "component").values)
+    wrenches = np.nan_to_num(values_of(estimated, "foot_wrench_measured"))
     found = np.zeros((len(wrenches), len(model.segment_names), 6))
     for k, name in enumerate(estimated["foot_segment"].values):
         found[:, model.segment_names.index(str(name))] += wrenches[:, k]

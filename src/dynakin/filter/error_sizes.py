@@ -1,0 +1,109 @@
+"""How large the systematic errors are that a filter cannot know (`systematic`), by where joints come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import get_args
+
+import numpy as np
+
+from dynakin.filter.joint_errors import Kind
+from dynakin.model.calibration.calibrated import CalibratedModel
+
+OF_JOINTS = get_args(Kind)
+KINDS = (*OF_JOINTS, "skin", "mass_centre")
+"""What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
+CENTRES = ("hinge_centre", "ball_centre")
+"""What goes by how far markers have moved, too."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Standard deviations of the errors, of each component; where they come from is in docs/derivations.md.
+
+    Attributes:
+        hinge_centre, ball_centre: m, of the centre of a joint with one or two axes (knee, ankle), with three (hip).
+        hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar) or
+            three.
+        root: rad, of the turn of the pelvis' frame in the pelvis.
+        skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
+        mass_centre: m, of the centre of mass of each segment off where the model has it.
+        placed: m, how far (mean) markers may be found from where the model has them, for centres of joints to be as
+            sure as said: of a model that was scaled worse to the person both are off, in proportion.
+        own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
+            intensity (`reported_sd.OWN_LATE`).
+        own_off_plates: part of the variance by the declared noise that counts at least, of late moments that are
+            measured in a recording in which some foot stands off the plates, or in a session in which one has: what
+            plates do not see they do not correct, and small innovations do not show it.
+        inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
+            `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
+    """
+
+    hinge_centre: float
+    ball_centre: float
+    hinge_axes: float
+    pair_axes: float
+    ball_axes: float
+    root: float
+    skin: float
+    mass_centre: float
+    placed: float
+    own_speeds: float
+    own_off_plates: float
+    inertia: bool = True
+
+    def scaled(self, factor: float) -> Sizes:
+        """The errors of joints, skin and centres of mass times a factor."""
+        return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
+
+
+LANDMARKS = Sizes(
+    hinge_centre=0.0042,
+    ball_centre=0.005,
+    hinge_axes=np.radians(2.0),
+    pair_axes=np.radians(3.0),
+    ball_axes=np.radians(0.4),
+    root=np.radians(0.5),
+    skin=0.12,
+    mass_centre=0.02,
+    placed=np.inf,
+    own_speeds=0.17,
+    own_off_plates=0.14,
+)
+"""Joints that are found from markers on the skin."""
+UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
+"""Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
+(`docs/validation/geometry.md`)."""
+ONE_SIDED = 0.010 / LANDMARKS.hinge_centre
+"""Times as far off as others is the centre of a knee or ankle with a lateral marker alone and no width that somebody
+measured (`docs/validation/geometry.md`)."""
+SCALED = Sizes(
+    hinge_centre=0.0014,
+    ball_centre=0.0016,
+    hinge_axes=np.radians(1.3),
+    pair_axes=np.radians(1.3),
+    ball_axes=np.radians(0.8),
+    root=np.radians(0.9),
+    skin=0.08,
+    mass_centre=0.003,
+    placed=0.005,
+    own_speeds=0.06,
+    own_off_plates=0.034,
+    inertia=False,
+)
+"""Joints of a skeleton that was scaled to the person (.osim): as well as can be where markers lie within ``placed``."""
+
+
+def usual_sizes(calibrated: CalibratedModel) -> Sizes:
+    """By where the joints of a model come from."""
+    if calibrated.plan is None:
+        return SCALED
+    return UNMARKED if calibrated.unmarked_joints else LANDMARKS
+
+
+def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:
+    """Segment -> how many times as far off the centre of its joint may be as those of others."""
+    if calibrated.unmarked_joints:  # all are said to be as unsure
+        return {}
+    turns = {f"{joint[:-2]}_angle{joint[-2:]}" for joint in calibrated.one_sided_joints}  # knee_r: knee_angle_r
+    return {s.name: ONE_SIDED for s in calibrated.spec.segments if turns & {axis.coordinate for axis in s.axes}}

@@ -1,0 +1,82 @@
+"""The standard deviation that is reported: of the filter's own variance the part that holds for this movement, and the
+systematic errors (`systematic`) of their sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter.error_sizes import CENTRES, KINDS, Sizes
+from dynakin.results.measures.sources import MEASURED, PRIOR
+
+Array = npt.NDArray[np.float64]
+
+BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
+
+Own = dict[str, tuple[float, float]]
+OWN_LATE: Own = {"coordinates": (1.0, 0.0), "accelerations": (0.12, 0.04), "moments": (0.25, 0.0)}
+"""Factor on the filter's own variance of a block where later frames helped: the first number, and the second times the
+`movement_intensity`. One density of jerk serves all movements: in theory half of a speed's variance is what such jerk
+leaves unseen, and five sixths of an acceleration's; a calm movement has none of it, an intense one more. Speeds have
+`SPEEDS_STILL` and `Sizes.own_speeds`."""
+SPEEDS_STILL = 0.25
+OWN_AT_ONCE: Own = {
+    "coordinates": (1.0, 0.0),
+    "speeds": (SPEEDS_STILL, 0.4),
+    "accelerations": (SPEEDS_STILL, 0.4),
+    "moments": (0.08, 0.17),
+}
+"""The same without later frames."""
+
+
+def movement_intensity(acceleration: Array, sd: Array) -> Array:
+    """(...,) mean square of accelerations (..., K) over the filter's own deviations of them, of what moves."""
+    moves = sd > 0.0
+    ratio = np.divide(acceleration, sd, out=np.zeros_like(sd), where=moves)
+    return np.asarray(np.square(ratio).sum(axis=-1) / np.maximum(moves.sum(axis=-1), 1))
+
+
+Parts = dict[str, dict[str, Array]]
+
+
+def reported(
+    sizes: Sizes,
+    variance_scale: float,
+    own: Mapping[str, Array],
+    parts: Parts,
+    intensity: Array,
+    moved_m: Array,
+    sources: npt.NDArray[np.uint8] | None = None,
+    *,
+    off_plates: bool = False,
+    late: bool,
+) -> dict[str, Array]:
+    """Standard deviations that are reported: block -> (..., C).
+
+    Args:
+        variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
+            `Systematic.over_time`. intensity: (...,) as of `movement_intensity`. moved_m: (...,) as of
+            `Systematic.moved_m`. sources: (..., C) of the moments (`results.measures.sources`): the filter's own part
+            of what rests on a prior counts in full, because how a jerk is seen has no part in that. off_plates: whether
+            `Sizes.own_off_plates` counts. late: whether later frames helped.
+    """
+    factors = OWN_LATE | {"speeds": (SPEEDS_STILL, sizes.own_speeds)} if late else OWN_AT_ONCE
+    farther = np.maximum(moved_m / sizes.placed, 1.0)[..., None]
+    found = {}
+    for block, sd in own.items():
+        still, moving = factors[block]
+        factor = still + moving * intensity[..., None]
+        if sources is not None and block == "moments":
+            measured = sizes.own_off_plates / variance_scale if late and off_plates else 0.0
+            least = np.select([sources == PRIOR, sources == MEASURED], [1.0, measured], 0.0)
+            factor = np.maximum(factor, least)
+        variance = factor * np.square(sd)
+        for kind in KINDS:
+            size = getattr(sizes, kind) * (farther if kind in CENTRES else 1.0)
+            variance = variance + size**2 * parts[kind][block]
+        if sizes.inertia:  # the filter's own part has so much of it already
+            variance = variance + np.maximum(1.0 - factor * variance_scale, 0.0) * parts["inertia"][block]
+        found[block] = np.sqrt(variance)
+    return found
