@@ -110,7 +110,7 @@ def variance_scales(names: Collection[str], noise: Noise) -> Array:
 
 def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
     """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it. Those
-    of speeds and accelerations are not scaled: people move as fast when a recording begins, however well it is measured.
+    of speeds and accelerations are not scaled: people move as fast when a recording begins, however well seen.
     """
     root = np.sqrt(variance_scales(initial.names, noise))
     root[[name.endswith(("/speed", "/acceleration")) for name in initial.names]] = 1.0
