@@ -67,6 +67,14 @@ def test_where_nothing_shows_it_fixed_delays_are_taken() -> None:
     assert cut.on == -np.inf and cut.off == np.inf
 
 
+def test_a_foot_that_is_not_seen_before_or_after_has_no_touch_down_or_toe_off_there() -> None:
+    step, frames = a_step(50, 120, 50, 113), np.arange(FRAMES)
+    (span,) = spans_of(replace(step, seen=(frames >= 50) & (frames < 113)), (0, 1), RATE_HZ)
+    assert (span.on, span.off) == (-np.inf, np.inf)
+    (span,) = spans_of(replace(step, seen=(frames < 113) | (frames > 150)), (0, 1), RATE_HZ)  # a gap: it lifts off
+    assert span.on == pytest.approx(50, abs=2) and np.isfinite(span.off)
+
+
 def test_one_foot_takes_what_the_other_gives() -> None:
     """In a double support of a walk the two weights are one together, and half each in its middle; where the feet stand
     together for longer than a walk does they are not."""

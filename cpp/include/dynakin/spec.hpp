@@ -88,7 +88,7 @@ struct ModelSpec {
   std::array<bool, 6> wrench_measured = {true, true, true, true, true, true};
   std::array<bool, 6> wrench_offset{};  // components whose slow error, about wrench_offset_point, is estimated
   Vector3 wrench_offset_point = Vector3::Zero();  // m, ground frame
-  bool wrench_delay = false;            // whether the plates' delay behind the markers is estimated
+  bool wrench_delay = false;                      // whether the plates' delay behind the markers is estimated
   // Contacts whose wrench on the person is a state where no plate measures it: six numbers each, of unit variance, that
   // a WrenchModel turns into newtons.
   std::vector<std::string> contacts = {};

@@ -172,12 +172,12 @@ void bind_spec(nb::module_& m) {
   nb::class_<ModelSpec> model(m, "ModelSpec", "A model as plain data; Model checks and compiles it.");
   model
       .def(nb::init<std::string, std::vector<CoordinateSpec>, std::vector<ParameterSpec>, std::vector<SegmentSpec>,
-                    std::vector<MarkerSpec>, Vector3, Flags6, Flags6, bool, std::vector<std::string>, Vector3>(),
+                    std::vector<MarkerSpec>, Vector3, Flags6, Flags6, Vector3, bool, std::vector<std::string>>(),
            nb::arg("name"), nb::arg("coordinates"), nb::arg("parameters"), nb::arg("segments"), nb::arg("markers"),
            nb::arg("gravity") = Vector3(0.0, -9.80665, 0.0),
            nb::arg("wrench_measured") = Flags6{true, true, true, true, true, true}, nb::arg("wrench_offset") = Flags6{},
-           nb::arg("wrench_delay") = false, nb::arg("contacts") = std::vector<std::string>(),
-           nb::arg("wrench_offset_point") = Vector3(0.0, 0.0, 0.0))
+           nb::arg("wrench_offset_point") = Vector3(0.0, 0.0, 0.0), nb::arg("wrench_delay") = false,
+           nb::arg("contacts") = std::vector<std::string>())
       .def_rw("name", &ModelSpec::name)
       .def_rw("coordinates", &ModelSpec::coordinates)
       .def_rw("parameters", &ModelSpec::parameters)
@@ -186,10 +186,10 @@ void bind_spec(nb::module_& m) {
       .def_rw("gravity", &ModelSpec::gravity, nb::rv_policy::copy)
       .def_rw("wrench_measured", &ModelSpec::wrench_measured)
       .def_rw("wrench_offset", &ModelSpec::wrench_offset)
+      .def_rw("wrench_offset_point", &ModelSpec::wrench_offset_point, nb::rv_policy::copy)
       .def_rw("wrench_delay", &ModelSpec::wrench_delay)
-      .def_rw("contacts", &ModelSpec::contacts)
-      .def_rw("wrench_offset_point", &ModelSpec::wrench_offset_point, nb::rv_policy::copy);
+      .def_rw("contacts", &ModelSpec::contacts);
   picklable(model, &ModelSpec::name, &ModelSpec::coordinates, &ModelSpec::parameters, &ModelSpec::segments,
             &ModelSpec::markers, &ModelSpec::gravity, &ModelSpec::wrench_measured, &ModelSpec::wrench_offset,
-            &ModelSpec::wrench_delay, &ModelSpec::contacts, &ModelSpec::wrench_offset_point);
+            &ModelSpec::wrench_offset_point, &ModelSpec::wrench_delay, &ModelSpec::contacts);
 }

@@ -107,9 +107,10 @@ def expected_loads(
     alone = unmeasured.sum(axis=1) == 1
     priors: dict[int, Prior] = {}
     each = np.arange(K)
-    height = np.column_stack([filled(loads.soles.middle[:, :, 1]), np.zeros((frames, C))])
+    places = np.concatenate([loads.soles.middle, paths[:, 1:]], axis=1)
+    places = np.where(np.isfinite(places), places, (root * [1.0, 0.0, 1.0])[:, None])
     errors[:, each, :, each] = (
-        plate_errors(wrench[:, :K].reshape(-1, 6), height.reshape(-1)).reshape(frames, K, 6, 6).swapaxes(0, 1)
+        plate_errors(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3)).reshape(frames, K, 6, 6).swapaxes(0, 1)
     )
     for k in range(K):
         off = unmeasured[:, k]
@@ -123,7 +124,7 @@ def expected_loads(
         wrench[off, k], effects[off, :, k] = prior.mean[off], prior.spread[off]
         errors[off, k, :, k] = _about(root[off], np.array([_WHITE_N] * 3 + [_WHITE_NM] * 3))
     for t in np.flatnonzero((contact == SHARED_PLATE).any(axis=1)):
-        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors, height)
+        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors, places)
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -147,12 +148,13 @@ def residual_sd(noise: Noise, initial: CalibratedModel) -> Array:
     return np.where(size.all(), np.hypot(size, more), size)
 
 
-def plate_errors(wrench: Array, height_m: Array) -> Array:
+def plate_errors(wrench: Array, contact: Array) -> Array:
     """Covariances (T, 6, 6) about the ground's origin of what a plate says, (T, 6) about it too: at its centre of
-    pressure at a height (T,), of what the foot stands on."""
-    push, over = np.maximum(np.abs(wrench[:, 1]), LOADED_N), wrench[:, [2, 0]] * height_m[:, None]
-    z, x = ((over - wrench[:, [3, 5]] * [1.0, -1.0]) / push[:, None]).T
-    pressure = np.stack([x, height_m, z], axis=1)
+    pressure on the level of the contact (T, 3) m, at that itself where the plate is hardly loaded."""
+    push, height = np.maximum(np.abs(wrench[:, 1]), LOADED_N), contact[:, 1]
+    z, x = (wrench[:, 2] * height - wrench[:, 3]) / push, (wrench[:, 0] * height + wrench[:, 5]) / push
+    loaded = (wrench[:, 1] > LOADED_N)[:, None]
+    pressure = np.where(loaded, np.stack([x, height, z], axis=1), contact)
     shear, lift = np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), np.hypot(PLATE_NOISE_N, PLATE_GAIN * push)
     moment = np.hypot(PLATE_NOISE_NM, PLATE_PLACE_M * push)
     return _about(pressure, np.stack([shear, lift, shear, moment, moment, moment], axis=1))
@@ -204,11 +206,11 @@ def _about(point: Array, sd: Array) -> Array:
 
 
 def _divide(
-    t: int, feet: npt.NDArray[np.intp], priors: dict[int, Prior], wrench: Array, errors: Array, height: Array
+    t: int, feet: npt.NDArray[np.intp], priors: dict[int, Prior], wrench: Array, errors: Array, places: Array
 ) -> None:
     """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
-    plate = plate_errors(wrench[t, feet].sum(axis=0)[None], height[t, feet[:1]])[0]
+    plate = plate_errors(wrench[t, feet].sum(axis=0)[None], places[t, feet[:1]])[0]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
     root = np.linalg.cholesky(S)

@@ -45,14 +45,14 @@ def test_calibrated_on_the_trial_it_is_closer(data_dir: Path) -> None:
 
 
 @pytest.mark.nightly
-def test_nothing_is_left_at_the_pelvis(data_dir: Path) -> None:
+def test_what_is_left_at_the_pelvis_is_the_declared_residual(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
     recording = dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
     everything: tuple[Quantity, ...] = ("lengths", "markers", "soft_tissue", "inertia")
     data = estimator_of(folder, everything, dynakin.presets.default()).run(recording).data
     rest = data["wrench_remainder"].values
     assert np.isfinite(rest).all()  # both feet on plates in every frame
-    assert np.abs(rest).max() < 1e-9
+    assert np.sqrt(np.mean(rest**2)) < 7.0 and np.abs(rest).max() < 30.0  # N, N m: the declared residual, 12 and 4
     names = [str(name) for name in data["coordinate"].values]
     pelvis = [names.index(f"pelvis_{way}") for way in ("tx", "ty", "tz", "tilt", "list", "rotation")]
     assert np.abs(data["moments"].values[:, pelvis]).max() < 1e-9
