@@ -92,9 +92,7 @@ def test_nothing_that_is_withheld_is_used(walk: SimulatedTrial, setup: Setup, fi
     recording = walk.recording
     name = "r_thigh2"
     markers = recording.markers.copy()
-    markers[len(markers) // 2 :, recording.marker_names.index(name)] += (
-        0.06  # further off it is no marker of this segment any more
-    )
+    markers[len(markers) // 2 :, recording.marker_names.index(name)] += 0.06  # further off it is left out
     found = unseen_figures(replace(recording, markers=markers), setup)
     assert found["marker left out", name, FILTER] > 30.0  # type: ignore[operator]
     honest, other = (each["marker left out", "L_thigh2", FILTER] for each in (figures, found))
