@@ -15,7 +15,8 @@ import pytest
 from dynakin.errors import ModelError, RecordingError
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import MarkerMatch, match_markers
-from dynakin.model.markers.recognise import Recognised, choose_marker_set, recognise
+from dynakin.model.markers.recognise import Recognised, _without_swap, choose_marker_set, recognise
+from dynakin.model.markers.swaps import Swap
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import FacingPairs
 from dynakin.recordings.orientation import find_forward
@@ -174,6 +175,44 @@ def test_an_exchange_from_a_frame_on_is_named_with_its_time() -> None:
     (said,) = warnings_of(found.messages)
     assert "look swapped from 2.40 to 3.96 s" in said
     assert "used as they are" in said and not found.match.left_out  # the filter refuses them there
+
+
+@pytest.mark.parametrize("place", ["THI", "KNE", "TIB", "ANK", "HEE"])
+@pytest.mark.parametrize("start", [47, 40])
+def test_right_for_left_from_about_the_middle_on_is_named_and_nothing_else(place: str, start: int) -> None:
+    """A marker that is on the other leg for half of the trial is anywhere there: which half is right, the length that
+    returns shows."""
+    found = recognise(exchanged(walking("plug-in-gait"), f"R{place}", f"L{place}", slice(start, None)))
+    (said,) = warnings_of(found.messages)
+    assert f"R{place} and L{place} look swapped" in said or f"L{place} and R{place} look swapped" in said
+    assert set(found.match.left_out) <= {(place, "right"), (place, "left")}
+
+
+def test_exchanges_that_share_a_marker_are_said_one_by_one() -> None:
+    """By the second RTHI and LTHI are each other's, and by the first LTHI is left out."""
+    match = recognised("plug-in-gait").match
+    one, other = (("KNE", "left"), ("THI", "left")), (("THI", "right"), ("THI", "left"))
+    for pairs in ((one, other), (other, one)):
+        left = match
+        for pair in pairs:
+            left, said = _without_swap(left, Swap((pair,), "they", "far apart"), 0.0)
+            assert "they look swapped" in said
+        assert ("THI", "left") not in left.names and ("KNE", "left") not in left.names
+
+
+def test_several_exchanges_of_any_markers_end_in_words() -> None:
+    whole = walking("plug-in-gait")
+    draw = np.random.default_rng(3)
+    for _ in range(12):
+        recording = whole
+        for _ in range(int(draw.integers(1, 4))):
+            start = int(draw.integers(35, 60))
+            one, other = (str(name) for name in draw.choice(whole.marker_names, 2, replace=False))
+            recording = exchanged(recording, one, other, slice(start, None))
+        try:
+            assert recognise(recording).match.names
+        except ModelError as error:
+            assert "expected" in error.message
 
 
 def test_an_exchange_at_the_start_leaves_both_out() -> None:
