@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError, RecordingError
+from dynakin.model.definition import load_model
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import MarkerMatch, match_markers
 from dynakin.model.markers.recognise import Recognised, _without_swap, choose_marker_set, recognise
@@ -22,6 +23,7 @@ from dynakin.recordings.landmarks import FacingPairs
 from dynakin.recordings.orientation import find_forward
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
+from dynakin.settings.subject import Subject
 from dynakin.simulation.bodies.markers import marker_positions
 from dynakin.simulation.bodies.registry import choose_body
 from dynakin.simulation.bodies.subject import Spread
@@ -186,6 +188,12 @@ def test_right_for_left_from_about_the_middle_on_is_named_and_nothing_else(place
     (said,) = warnings_of(found.messages)
     assert f"R{place} and L{place} look swapped" in said or f"L{place} and R{place} look swapped" in said
     assert set(found.match.left_out) <= {(place, "right"), (place, "left")}
+
+
+def test_a_refusal_for_want_of_exchanged_markers_names_the_exchange() -> None:
+    recording = exchanged(walking("plug-in-gait"), "RANK", "RHEE", slice(45, None))
+    with pytest.raises(ModelError, match=r"no marker shows right ankle.* RANK.* look swapped.*the labels corrected"):
+        load_model("fullbody", subject=Subject(mass_kg=62.0, height_m=1.66)).calibrate(recording)
 
 
 def test_exchanges_that_share_a_marker_are_said_one_by_one() -> None:

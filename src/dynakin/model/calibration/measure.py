@@ -21,7 +21,7 @@ from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
-from dynakin.model.markers.recognise import lacking, recognise
+from dynakin.model.markers.recognise import CORRECT, LEG, lacking, recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
@@ -209,6 +209,11 @@ def _no_legs(supposed: Sequence[str], source: Trial, static: Recording | None, l
     if static is not None:
         expected = "another one, of the person standing still with markers on knees and ankles (--static)"
     said = f"no marker shows {listed([words(name) for name in supposed])}, and nobody stands still in it"
+    match = source.match
+    on_legs = [why for (name, _), why in match.left_out.items() if match.marker_set.marker(name).segment in LEG]
+    whys = (why.removesuffix(f": {CORRECT}") for why in on_legs)
+    if reasons := "; ".join(dict.fromkeys(whys)):
+        return f"{match.where}: {said}, because markers are left out: {reasons}; expected the labels corrected."
     return " ".join([f"{source.match.where}: {said}; expected {expected}.", *legs.failed])
 
 

@@ -32,7 +32,8 @@ from dynakin.recordings.recording import Recording
 from dynakin.units import PERSON_HEIGHT_M
 
 _LISTED = 8  # names in a sentence
-_LEG = ("thigh", "shank", "foot")
+LEG = ("thigh", "shank", "foot")
+CORRECT = "correct the labels"
 _ON_LEG_AT_LEAST = 2  # segments of one leg
 _ROOT = "pelvis"
 _ABOUT_AS_MANY = 0.9  # of the markers that the first set explains
@@ -73,11 +74,11 @@ def lacking(marker_set: MarkerSetFile, names: Mapping[MarkerKey, str]) -> list[s
         side: {_segment(marker_set, name) for name, own in names if own in (side, "centre")}
         for side in ("right", "left")
     }
-    best = max(("right", "left"), key=lambda side: len(parts[side] & set(_LEG)))
+    best = max(("right", "left"), key=lambda side: len(parts[side] & set(LEG)))
     lacks = [] if any(_ROOT in found for found in parts.values()) else [_names_on(marker_set, _ROOT, best)]
-    here = parts[best] & set(_LEG)
+    here = parts[best] & set(LEG)
     if len(here) < _ON_LEG_AT_LEAST:
-        lacks += [_names_on(marker_set, segment, best) for segment in _LEG if segment not in here]
+        lacks += [_names_on(marker_set, segment, best) for segment in LEG if segment not in here]
     return lacks
 
 
@@ -279,7 +280,7 @@ def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[Marke
     ):  # another exchange may have had one left out
         # right for left of one place: both are seen, and nothing else would put both where a body has them
         return match.exchanged(*swap.pairs[0]), f"Warning: {looks}; each is used as the other: correct the labels."
-    left = match.without(swap.keys, looks + ": correct the labels")
+    left = match.without(swap.keys, f"{looks}: {CORRECT}")
     if not lacking(match.marker_set, match.names) and (lacks := lacking(left.marker_set, left.names)):
         raise ModelError(
             f"{match.where}: {looks}, and without them there is nothing {'; '.join(lacks)}; expected the labels "
