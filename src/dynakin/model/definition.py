@@ -16,7 +16,6 @@ from dynakin.files import is_file
 from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior, first_centre_of_pressure
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import measure
-from dynakin.model.markers.draft.draft import GUESSED
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
 from dynakin.model.markers.recognise import choose_marker_set, lacking, recognise
@@ -247,7 +246,7 @@ class ModelDefinition:
             unmarked_kg=unmarked_kg,
             held=held,
             joint_prior=None if together is None else JointPrior(*together),
-            guessed_places=self.marker_set is None and rest.trial.match.marker_set.name == GUESSED,
+            guessed_places=bool(rest.trial.match.guessed),
             unmarked_joints=rest.unmarked_joints,
             one_sided_joints=rest.one_sided_joints,
         )

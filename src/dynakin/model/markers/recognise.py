@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dynakin.errors import ModelError, RecordingError
-from dynakin.model.markers.draft.draft import drafted
+from dynakin.model.markers.anatomy import anatomy
+from dynakin.model.markers.draft.draft import Guess, drafted, further, names_of
 from dynakin.model.markers.geometry import (
     Expected,
     Found,
@@ -17,7 +18,7 @@ from dynakin.model.markers.geometry import (
     frames_of,
     places_of,
 )
-from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.marker_set import available_marker_sets, enlarged_marker_set, load_marker_set
 from dynakin.model.markers.match import (
     SIDES,
     MarkerKey,
@@ -179,7 +180,55 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
             best = own
     assert best is not None
     _refuse_wrong_set(best, where)
-    return Recognised(best.match, (choice_words(best.match, ranked), *best.messages), best.wrong_n)
+    best, more = _enlarged(recording, best)
+    choice = choice_words(best.match, ranked)
+    if more:
+        choice = f"{choice.removesuffix('.')}; used by what their names say: {_places(more)}."
+    doubtful = [guess for guess in more if guess.place and guess.sure != "sure" and _on_leg_or_pelvis(guess)]
+    messages = [choice, *best.messages]
+    if doubtful:
+        messages.insert(1, _guessed_words(recording, len(doubtful), f" ({_places(doubtful)})"))
+    match = replace(best.match, guessed=tuple(guess.recorded for guess in doubtful))
+    return Recognised(match, tuple(messages), best.wrong_n)
+
+
+def _enlarged(recording: Recording, found: Recognised) -> tuple[Recognised, list[Guess]]:
+    """With markers whose names the set does not know but say a place that it leaves free, and these; without those that
+    the body contradicts, and without any that have a marker of the set left out."""
+    more = further(recording, found.match)
+    while more:
+        set_ = enlarged_marker_set(found.match.marker_set.name, names_of(more))
+        match = match_markers(set_, recording.marker_names, recording.seen, found.match.where)
+        try:
+            own = checked(recording, match)
+        except ModelError:
+            break
+        gone = {match.names[key] for key in own.match.left_out if key in match.names}
+        kept = [guess for guess in more if guess.recorded not in gone]
+        if len(kept) == len(more):
+            if found.match.names.items() <= own.match.names.items():
+                return own, more
+            break
+        more = kept
+    return found, []
+
+
+def _places(guesses: Sequence[Guess]) -> str:
+    words = [f"{guess.recorded} ({guess.place or guess.segment})" for guess in guesses]
+    more = f" and {len(words) - _LISTED} more" if len(words) > _LISTED else ""
+    return ", ".join(words[:_LISTED]) + more
+
+
+def _on_leg_or_pelvis(guess: Guess) -> bool:
+    return anatomy()["places"][guess.place].get("segment") in (_ROOT, *LEG)
+
+
+def _guessed_words(recording: Recording, n: int, which: str = "") -> str:
+    return (
+        f"Warning: no marker set has these names; {n} of {len(recording.seen_names)} markers{which} are used at places "
+        "guessed from their names and from where they lie. Look at them: "
+        f"dynakin markers new {recording.path or 'TRIAL'} -o my.toml, then --markers my.toml"
+    )
 
 
 def _guessed(recording: Recording, unknown: ModelError) -> Recognised:
@@ -200,12 +249,8 @@ def _guessed(recording: Recording, unknown: ModelError) -> Recognised:
     found = checked(recording, match_markers(guessed, recording.marker_names, recording.seen, where))
     if found.wrong_n or lacking(guessed, found.match.names):
         raise unknown
-    message = (
-        f"Warning: no marker set has these names; {len(found.match.names)} of {len(recording.seen_names)} markers are "
-        "used at places guessed from their names and from where they lie. Look at them: "
-        f"dynakin markers new {recording.path or 'TRIAL'} -o my.toml, then --markers my.toml"
-    )
-    return Recognised(found.match, (message, *found.messages))
+    match = replace(found.match, guessed=tuple(found.match.names.values()))
+    return Recognised(match, (_guessed_words(recording, len(match.names)), *found.messages))
 
 
 def choice_words(match: MarkerMatch, ranked: Sequence[Fit]) -> str:

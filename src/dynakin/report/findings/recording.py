@@ -47,8 +47,9 @@ def guessed(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if estimate.marker_places != "guessed":
         return None
     text = (
-        "No marker set has the names of this recording: where the markers sit on the body is guessed from their names "
-        "and from where they lie. Joint centres, angles and moments are as wrong as a place that is guessed wrongly."
+        "Names of this recording are in no marker set: where markers with these names sit on the body is guessed from "
+        "the names and from where they lie. Joint centres, angles and moments are as wrong as a place that is guessed "
+        "wrongly."
     )
     return Insight("warning", "Guessed marker places", text, "Look at them: dynakin markers new TRIAL -o my.toml.")
 
