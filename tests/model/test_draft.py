@@ -68,6 +68,13 @@ def judged(guesses: list[Guess], truth: dict[str, tuple[str | None, str, str]]) 
     ("Knie_lateral_rechts", "KNE", "right"), ("Ferse_links", "HEE", "left"), ("talon_droit", "HEE", "right"),
     ("rodilla_derecha", "KNE", "right"), ("R_FAL", "ANK", "right"), ("L_TAM", "ANM", "left"),
     ("RElbowIn", "ELM", "right"), ("WaistRFront", "ASI", "right"), ("V.Sacral", "SACR", "centre"),
+    ("R_SIAS", "ASI", "right"), ("EIPS izquierda", "PSI", "left"), ("Knöchel außen links", "ANK", "left"),
+    ("Innenknöchel_R", "ANM", "right"), ("malléole externe droite", "ANK", "right"), ("épaule_gauche", "SHO", "left"),
+    ("malleolo interno dx", "ANM", "right"), ("rodilla lateral derecha", "KNE", "right"),
+    ("enkel links", "ANK", "left"), ("knie_binnen_rechts", "KNM", "right"), ("hiel rechts", "HEE", "right"),
+    ("ginocchio esterno sx", "KNE", "left"), ("tobillo interno izquierdo", "ANM", "left"),
+    ("RToe1", "MT1", "right"), ("LToe5", "MT5", "left"),
+    ("RToe", "TOE", "right"),
     ("GTRO_R", "GTR", "right"), ("LHJC", "HJC", "left"), ("R1stMet", "MT1", "right"), ("CV7", "C7", "centre"),
 ])  # fmt: skip
 def test_names_in_several_languages(name: str, place: str, side: str) -> None:

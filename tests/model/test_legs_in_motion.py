@@ -20,6 +20,7 @@ from dynakin.model.definition import load_model
 from dynakin.recordings.recording import Recording
 from dynakin.report.insights import insights
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.records import NEVER_FLAT
 from dynakin.settings.noise import Noise
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
@@ -155,3 +156,41 @@ def test_a_joint_with_a_lateral_marker_alone_is_less_sure() -> None:
     moments = [Systematic(each, Noise()) for each in (both, one)]
     spread = [np.linalg.norm(each._errors.sources, axis=0).max() for each in moments]
     assert spread[1] > 1.5 * spread[0]
+
+
+def without_toes(recording: Recording) -> Recording:
+    gone = [k for k, name in enumerate(recording.marker_names) if name in ("RTOE", "LTOE", "RMT5", "LMT5")]
+    assert gone
+    markers = recording.markers.copy()
+    markers[:, gone] = np.nan
+    return replace(recording, markers=markers)
+
+
+def test_feet_without_toes_of_whom_never_stands_have_an_ankle_of_unknown_zero() -> None:
+    """Standing still, or by a standing trial, the sole is flat, and no doubt is left."""
+    walk = simulate("fullbody", "gait", 5, 4.0, markers="plug-in-gait")
+    stands = without_toes(simulate("fullbody", "squat", 5, 6.0, markers="plug-in-gait").recording)
+    estimator = dynakin.Estimator(load_model("fullbody", subject=WHO, markers="plug-in-gait"))
+    for recording, static in ((walk.recording, None), (without_toes(walk.recording), stands), (stands, None)):
+        said = estimator.calibrate(recording, static=static).messages
+        assert not any(NEVER_FLAT in text for text in said)
+    found = estimator.track(without_toes(walk.recording)).estimate
+    truth = walk.truth.data["coordinates"].sel(coordinate="ankle_angle_r").values
+    error = found.data["coordinates"].sel(coordinate="ankle_angle_r").values - truth
+    assert abs(np.degrees(np.median(error))) > 4.0
+    finding = next(each for each in insights(found, compute_metrics(found)) if each.title == "Ankle angles")
+    assert finding.level == "warning" and "right foot and the left foot" in finding.text
+    assert "--static" in finding.advice
+
+
+def test_a_foot_that_is_never_seen_flat_stands_as_an_adults_whose_heel_and_toes_are_marked() -> None:
+    """The great toe's end and the heel of a markerless system never touch the ground together in this walk: taken for
+    flat where it begins, ankles were 21 and 15 deg off."""
+    walk = simulate("fullbody", "gait", 5, 4.0, markers="body25")
+    found = dynakin.Estimator(load_model("fullbody", subject=WHO, markers="body25")).track(walk.recording).estimate
+    for side in "rl":
+        name = f"ankle_angle_{side}"
+        truth = walk.truth.data["coordinates"].sel(coordinate=name).values
+        error = found.data["coordinates"].sel(coordinate=name).values - truth
+        assert abs(np.degrees(np.median(error))) < 5.0
+    assert any(NEVER_FLAT in text and "may be 5 deg off" in text for text in found.messages)

@@ -46,7 +46,7 @@ def print_summary(result: Result, folder: Path) -> None:
         console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
 
 
-SAID_BEFORE = ("Joint moments", "Mass", "Joint centres", "Subject", "Force plates", "Recording")
+SAID_BEFORE = ("Joint moments", "Mass", "Joint centres", "Subject", "Ankle angles", "Force plates", "Recording")
 """Titles of findings that stand above the figures."""
 ALWAYS = ("Uncertainty", "Adaptation")
 """Those that are said where they are no warning too."""

@@ -20,7 +20,6 @@ from dynakin.model.calibration.calibrated import (
 )
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import Asked, measure
-from dynakin.model.markers.draft.draft import GUESSED
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
 from dynakin.model.markers.recognise import choose_marker_set, lacking, recognise
@@ -240,7 +239,7 @@ class ModelDefinition:
             unmarked_kg=unmarked_kg,
             held=held,
             joint_prior=None if together is None else JointPrior(*together),
-            guessed_places=self.marker_set is None and rest.trial.match.marker_set.name == GUESSED,
+            guessed_places=bool(rest.trial.match.guessed),
             unmarked_joints=rest.unmarked_joints,
             one_sided_joints=rest.one_sided_joints,
         )

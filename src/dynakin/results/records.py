@@ -21,6 +21,8 @@ NO_ESTIMATE = ("doubtful", "lost", "restarted")
 """Those of a frame whose numbers are no estimate."""
 MISPLACED = "markers lie"
 """How the warning begins of a model that does not fit the person."""
+NEVER_FLAT = "nothing shows the sole flat of "
+"""How the warning begins of feet whose ankles' zeros are not known."""
 NOT_SMOOTHED = "Not smoothed:"
 """How the message begins of a run whose settings have no smoother."""
 IN_STEP = "they were brought into step."

@@ -109,6 +109,23 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
     return rest
 
 
+def enlarged(data: Mapping[str, Any], more: Mapping[str, Any]) -> dict[str, Any]:
+    """A marker set's file with further names of places and further markers of clusters, which come last."""
+    data = _extended(data) if "extends" in data else data
+    places, clusters = dict(data["places"]), dict(data.get("clusters", {}))
+    for place, names in more["places"].items():
+        places[place] = _with_names(places.get(place, ()), names)
+    for segment, entries in more["clusters"].items():
+        clusters[segment] = [*clusters.get(segment, ()), *entries]
+    return {**data, "places": places, "clusters": clusters}
+
+
+def _with_names(given: str | Iterable[str] | Mapping[str, Any], more: Mapping[str, list[str]]) -> dict[str, Any]:
+    """What a file gives of a place, and more names by side."""
+    entry = _entry(given)
+    return entry | {side: [*entry.get(side, ()), *names] for side, names in more.items()}
+
+
 def _extended(data: Mapping[str, Any]) -> dict[str, Any]:
     """A set's contents on top of those of the built-in one that it extends."""
     folder, base = _FOLDER / "sets", data["extends"]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 from dynakin.errors import ModelError
 from dynakin.files import is_file
-from dynakin.model.markers.anatomy import expanded
+from dynakin.model.markers.anatomy import enlarged, expanded
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.settings.strict import nearest, read_toml, validate
 
@@ -35,6 +37,12 @@ def load_marker_set(name_or_path: str | Path) -> MarkerSetFile:
             ".toml file that exists"
         )
     return _built_in(path) if name in known else _read(path)
+
+
+def enlarged_marker_set(name: str, more: Mapping[str, Any]) -> MarkerSetFile:
+    """A built-in set that also knows further names (`anatomy.enlarged`)."""
+    path = Path(str(_FOLDER / f"{name}.toml"))
+    return validate(MarkerSetFile, expanded(enlarged(read_toml(path), more)), str(path))
 
 
 @cache

@@ -31,6 +31,7 @@ class MarkerMatch:
         recorded: all names in the recording.
         where: the recording, for messages.
         left_out: markers that the recording has under the set's name, but not at their place; why not.
+        guessed: recorded names whose places on pelvis and legs no set of that name has: guessed.
     """
 
     marker_set: MarkerSetFile
@@ -38,6 +39,7 @@ class MarkerMatch:
     recorded: tuple[str, ...]
     where: str
     left_out: dict[MarkerKey, str] = field(default_factory=dict)
+    guessed: tuple[str, ...] = ()
 
     @property
     def facing_pairs(self) -> FacingPairs:
@@ -106,9 +108,7 @@ class MarkerMatch:
         """The same without some markers."""
         gone = set(keys)
         kept = {key: name for key, name in self.names.items() if key not in gone}
-        return MarkerMatch(
-            self.marker_set, kept, self.recorded, self.where, self.left_out | dict.fromkeys(sorted(gone), why)
-        )
+        return replace(self, names=kept, left_out=self.left_out | dict.fromkeys(sorted(gone), why))
 
     def exchanged(self, one: MarkerKey, other: MarkerKey) -> MarkerMatch:
         """The same with two markers that bear each other's names."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dynakin.errors import ModelError, RecordingError
-from dynakin.model.markers.draft.draft import drafted
+from dynakin.model.markers.anatomy import anatomy
+from dynakin.model.markers.draft.draft import Guess, drafted, further, names_of
 from dynakin.model.markers.geometry import (
     Expected,
     Found,
@@ -17,7 +18,7 @@ from dynakin.model.markers.geometry import (
     frames_of,
     places_of,
 )
-from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.marker_set import available_marker_sets, enlarged_marker_set, load_marker_set
 from dynakin.model.markers.match import (
     SIDES,
     MarkerKey,
@@ -33,7 +34,8 @@ from dynakin.results.records import WARNING
 from dynakin.units import PERSON_HEIGHT_M
 
 _LISTED = 8  # names in a sentence
-_LEG = ("thigh", "shank", "foot")
+LEG = ("thigh", "shank", "foot")
+CORRECT = "correct the labels"
 _ON_LEG_AT_LEAST = 2  # segments of one leg
 _ROOT = "pelvis"
 _ABOUT_AS_MANY = 0.9  # of the markers that the first set explains
@@ -74,11 +76,11 @@ def lacking(marker_set: MarkerSetFile, names: Mapping[MarkerKey, str]) -> list[s
         side: {_segment(marker_set, name) for name, own in names if own in (side, "centre")}
         for side in ("right", "left")
     }
-    best = max(("right", "left"), key=lambda side: len(parts[side] & set(_LEG)))
+    best = max(("right", "left"), key=lambda side: len(parts[side] & set(LEG)))
     lacks = [] if any(_ROOT in found for found in parts.values()) else [_names_on(marker_set, _ROOT, best)]
-    here = parts[best] & set(_LEG)
+    here = parts[best] & set(LEG)
     if len(here) < _ON_LEG_AT_LEAST:
-        lacks += [_names_on(marker_set, segment, best) for segment in _LEG if segment not in here]
+        lacks += [_names_on(marker_set, segment, best) for segment in LEG if segment not in here]
     return lacks
 
 
@@ -179,7 +181,55 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
             best = own
     assert best is not None
     _refuse_wrong_set(best, where)
-    return Recognised(best.match, (choice_words(best.match, ranked), *best.messages), best.wrong_n)
+    best, more = _enlarged(recording, best)
+    choice = choice_words(best.match, ranked)
+    if more:
+        choice = f"{choice.removesuffix('.')}; used by what their names say: {_places(more)}."
+    doubtful = [guess for guess in more if guess.place and guess.sure != "sure" and _on_leg_or_pelvis(guess)]
+    messages = [choice, *best.messages]
+    if doubtful:
+        messages.insert(1, _guessed_words(recording, len(doubtful), f" ({_places(doubtful)})"))
+    match = replace(best.match, guessed=tuple(guess.recorded for guess in doubtful))
+    return Recognised(match, tuple(messages), best.wrong_n)
+
+
+def _enlarged(recording: Recording, found: Recognised) -> tuple[Recognised, list[Guess]]:
+    """With markers whose names the set does not know but say a place that it leaves free, and these; without those that
+    the body contradicts, and without any that have a marker of the set left out."""
+    more = further(recording, found.match)
+    while more:
+        set_ = enlarged_marker_set(found.match.marker_set.name, names_of(more))
+        match = match_markers(set_, recording.marker_names, recording.seen, found.match.where)
+        try:
+            own = checked(recording, match)
+        except ModelError:
+            break
+        gone = {match.names[key] for key in own.match.left_out if key in match.names}
+        kept = [guess for guess in more if guess.recorded not in gone]
+        if len(kept) == len(more):
+            if found.match.names.items() <= own.match.names.items():
+                return own, more
+            break
+        more = kept
+    return found, []
+
+
+def _places(guesses: Sequence[Guess]) -> str:
+    words = [f"{guess.recorded} ({guess.place or guess.segment})" for guess in guesses]
+    more = f" and {len(words) - _LISTED} more" if len(words) > _LISTED else ""
+    return ", ".join(words[:_LISTED]) + more
+
+
+def _on_leg_or_pelvis(guess: Guess) -> bool:
+    return anatomy()["places"][guess.place].get("segment") in (_ROOT, *LEG)
+
+
+def _guessed_words(recording: Recording, n: int, which: str = "") -> str:
+    return (
+        f"Warning: no marker set has these names; {n} of {len(recording.seen_names)} markers{which} are used at places "
+        "guessed from their names and from where they lie. Look at them: "
+        f"dynakin markers new {recording.path or 'TRIAL'} -o my.toml, then --markers my.toml"
+    )
 
 
 def _guessed(recording: Recording, unknown: ModelError) -> Recognised:
@@ -200,12 +250,8 @@ def _guessed(recording: Recording, unknown: ModelError) -> Recognised:
     found = checked(recording, match_markers(guessed, recording.marker_names, recording.seen, where))
     if found.wrong_n or lacking(guessed, found.match.names):
         raise unknown
-    message = (
-        f"Warning: no marker set has these names; {len(found.match.names)} of {len(recording.seen_names)} markers are "
-        "used at places guessed from their names and from where they lie. Look at them: "
-        f"dynakin markers new {recording.path or 'TRIAL'} -o my.toml, then --markers my.toml"
-    )
-    return Recognised(found.match, (message, *found.messages))
+    match = replace(found.match, guessed=tuple(found.match.names.values()))
+    return Recognised(match, (_guessed_words(recording, len(match.names)), *found.messages))
 
 
 def choice_words(match: MarkerMatch, ranked: Sequence[Fit]) -> str:
@@ -274,10 +320,13 @@ def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[Marke
     later = swap.span_s is not None and swap.span_s[0] > start_s + _START_S
     if swap.share < _SHORT or (later and swap.share < _HALF):
         return match, f"Warning: {looks}: correct the labels; they are used as they are, and refused where they jump."
-    if swap.span_s is None and len(swap.pairs) == 1 and len({place for place, _ in swap.keys}) == 1:
+    one_place = len(swap.pairs) == 1 and len({place for place, _ in swap.keys}) == 1
+    if (
+        swap.span_s is None and one_place and swap.keys <= match.names.keys()
+    ):  # another exchange may have had one left out
         # right for left of one place: both are seen, and nothing else would put both where a body has them
         return match.exchanged(*swap.pairs[0]), f"Warning: {looks}; each is used as the other: correct the labels."
-    left = match.without(swap.keys, looks + ": correct the labels")
+    left = match.without(swap.keys, f"{looks}: {CORRECT}")
     if not lacking(match.marker_set, match.names) and (lacks := lacking(left.marker_set, left.names)):
         raise ModelError(
             f"{match.where}: {looks}, and without them there is nothing {'; '.join(lacks)}; expected the labels "

@@ -46,6 +46,7 @@ _OFF_M = 0.03  # a marker so far from its place on its segment is not where it w
 _MENDED = 0.5  # of that, at most, is left after the exchange
 _FEWEST_FRAMES = 2  # of those that are looked at
 _FEWEST_OTHERS = 2  # markers on the segments of two, by which an exchange of them is seen
+_RETURNS, _AS_NARROW_M = 0.4, 0.01  # of the frames; of a range of lengths
 _AS_GOOD = 0.9  # of what the best account gains
 
 
@@ -84,23 +85,26 @@ def find_swaps(
     """Labels that are exchanged, throughout or for a while; what the recording shows of the markers where they are not
     exchanged for a while; and the order of the markers that their names belong to.
 
-    Whichever of both is looked for first, the other may be taken for it: the account with the fewest exchanges counts.
-    found: over all `frames_of` the recording.
+    Whichever of both is looked for first, the other may be taken for it, and so may be what is the rule and what the
+    exception: the account with the fewest exchanges counts. found: over all `frames_of` the recording.
     """
     frames = frames_of(recording)
     throughout, order = _swaps_throughout(match, keys, found, expected)
     shown = {key: match.names[keys[k]] for key, k in zip(keys, order, strict=True)}
     right = replace(match, names=shown) if throughout else match
-    later = _swaps_for_a_while(recording, right, keys, found.ordered(order), expected)
-    first = (_merged(throughout, later, recording), found, order)
-    if not later:
-        return first
-    clean = _without(frames, recording, _swaps_for_a_while(recording, match, keys, found, expected))
-    found = Found.of(places_of(recording, match, keys, clean), expected)
-    throughout, order = _swaps_throughout(match, keys, found, expected)
-    earlier = _swaps_for_a_while(recording, match, keys, found, expected)
-    second = (_merged(throughout, earlier, recording), found, order)
-    return second if _n_labels(second[0]) < _n_labels(first[0]) else first
+    later = _swaps_for_a_while(recording, right, keys, found.ordered(order).distance, expected)
+    accounts = [(_merged(throughout, later, recording), found, order)]
+    returning = _returning(places_of(recording, match, keys, frames), expected.rigid)
+    for usual in (found.distance, returning):
+        known = usual is found.distance and not throughout  # asked already
+        exceptions = later if known else _swaps_for_a_while(recording, match, keys, usual, expected)
+        if exceptions:
+            clean = _without(frames, recording, exceptions)
+            without = Found.of(places_of(recording, match, keys, clean), expected)
+            rule, order = _swaps_throughout(match, keys, without, expected)
+            earlier = _swaps_for_a_while(recording, match, keys, without.distance, expected)
+            accounts.append((_merged(rule, earlier, recording), without, order))
+    return min((own for own in accounts if own[0]), key=lambda own: _n_labels(own[0]), default=accounts[0])
 
 
 def _n_labels(swaps: Sequence[Swap]) -> int:
@@ -237,18 +241,18 @@ def distance_words(one: str, other: str, found_m: float, usual_m: float) -> str:
 
 
 def _swaps_for_a_while(
-    recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey], found: Found, expected: Expected
+    recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey], usual: Array, expected: Expected
 ) -> list[Swap]:
     """Exchanges in a part of the trial: a marker leaves its place on its segment, and it and another fit where each is
-    at the other's place (of the other nothing may show it: a wand's only neighbour is the knee). What is the rule and
-    what the exception, the greater part of the trial says."""
+    at the other's place (of the other nothing may show it: a wand's only neighbour is the knee). usual: lengths (n, n)
+    m between markers of a segment that are no exception."""
     frames = frames_of(recording)
     places = places_of(recording, match, keys, frames)
     partners = [{int(j) for j in np.flatnonzero(row)} for row in expected.rigid]
     swaps: list[Swap] = []
     while len(swaps) < _MOST:
         lengths = np.linalg.norm(places[:, None] - places[:, :, None], axis=3)
-        off = _off(lengths, found.distance, expected.rigid)
+        off = _off(lengths, usual, expected.rigid)
         away, whole = off > _OFF_M, off.sum()
         accounts = []
         for i, j in combinations(range(len(keys)), 2):
@@ -262,7 +266,7 @@ def _swaps_for_a_while(
             changed = lengths[either][:, order[concerned]][:, :, order]
             after = off.copy()
             after[np.flatnonzero(either)[:, None], concerned] = _off(
-                changed, found.distance[concerned], expected.rigid[concerned]
+                changed, usual[concerned], expected.rigid[concerned]
             )
             mended = either & (after[:, [i, j]].max(axis=1) < _MENDED * off[:, [i, j]].max(axis=1))
             gain = float(whole - after.sum())
@@ -316,6 +320,23 @@ def _span(
 def _way(places: Array) -> float:
     """How long (m) the ways of markers (T, k, 3) are together, from each frame to the next as far as they are seen."""
     return float(np.nansum(np.linalg.norm(np.diff(places, axis=0), axis=2)))
+
+
+def _returning(places: Array, rigid: npt.NDArray[np.bool_]) -> Array:
+    """(n, n) m: the length between two markers (T, n, 3) of a segment that returns most often: the middle of the
+    narrowest range that holds `_RETURNS` of them, of ranges about as narrow the one nearest to the median. A marker
+    that is on the other leg for half of the trial is anywhere there, and draws the median away from both."""
+    usual = np.full(rigid.shape, np.nan)
+    for i, j in np.argwhere(np.triu(rigid)).tolist():
+        lengths = np.sort(np.linalg.norm(places[:, i] - places[:, j], axis=1))
+        lengths = lengths[np.isfinite(lengths)]
+        if not len(lengths):
+            continue
+        held = max(int(_RETURNS * len(lengths)), 1)
+        low, high = lengths[: len(lengths) - held + 1], lengths[held - 1 :]
+        middle, narrow = 0.5 * (low + high), high - low <= (high - low).min() + _AS_NARROW_M
+        usual[i, j] = usual[j, i] = middle[narrow][np.argmin(np.abs(middle[narrow] - np.median(lengths)))]
+    return usual
 
 
 def _off(lengths: Array, usual: Array, rigid: npt.NDArray[np.bool_]) -> Array:

@@ -10,7 +10,7 @@ from dynakin.report.labels import short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import marker_sites
 from dynakin.results.naming import listed, sentence, words
-from dynakin.results.records import MISPLACED, REFUSED, WARNING, doubts_mass, warnings_of
+from dynakin.results.records import MISPLACED, NEVER_FLAT, REFUSED, WARNING, doubts_mass, warnings_of
 
 # Words of warnings that a finding of their own says, or that are no doubt of the estimate.
 _SAID_ELSEWHERE = (
@@ -38,6 +38,7 @@ ADVICE = {
     "subject": "Give the mass and the height as measured (--mass, --height).",
     "scaling": "Scale the model to the person again, by a standing trial, or run without --model: fullbody measures "
     "its own.",
+    "ankles": "Give a standing trial (--static), or take these ankles' angles by their changes alone.",
     "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
 }
 
@@ -47,8 +48,9 @@ def guessed(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if estimate.marker_places != "guessed":
         return None
     text = (
-        "No marker set has the names of this recording: where the markers sit on the body is guessed from their names "
-        "and from where they lie. Joint centres, angles and moments are as wrong as a place that is guessed wrongly."
+        "Names of this recording are in no marker set: where markers with these names sit on the body is guessed from "
+        "the names and from where they lie. Joint centres, angles and moments are as wrong as a place that is guessed "
+        "wrongly."
     )
     return Insight("warning", "Guessed marker places", text, "Look at them: dynakin markers new TRIAL -o my.toml.")
 
@@ -76,6 +78,7 @@ def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
     for title, advice, belongs in (
         ("Subject", "subject", lambda text: text.startswith(_SUBJECT)),
         ("Model scaling", "scaling", lambda text: text.startswith(MISPLACED)),
+        ("Ankle angles", "ankles", lambda text: text.startswith(NEVER_FLAT)),
         ("Force plates", "plates", lambda text: "plate" in text),
         ("Recording", "recording", lambda text: True),
     ):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -19,8 +20,37 @@ Sure = Literal["sure", "likely", "unsure"]
 
 _FILE = resources.files("dynakin.model") / "markers" / "draft" / "places.toml"
 _WORDS = {
-    "right": ("right", "rechts", "derecha", "droite", "droit", "destro", "destra", "rt", "dx", "r"),
-    "left": ("left", "links", "izquierda", "gauche", "sinistro", "sinistra", "lt", "sx", "l"),
+    "right": (
+        "right",
+        "rechts",
+        "derecha",
+        "derecho",
+        "rechter",
+        "direita",
+        "direito",
+        "droite",
+        "droit",
+        "destro",
+        "destra",
+        "rt",
+        "dx",
+        "r",
+    ),
+    "left": (
+        "left",
+        "links",
+        "izquierda",
+        "izquierdo",
+        "linker",
+        "esquerda",
+        "esquerdo",
+        "gauche",
+        "sinistro",
+        "sinistra",
+        "lt",
+        "sx",
+        "l",
+    ),
 }
 # Segments whose clusters are named after them, longest word first.
 _SEGMENTS = {
@@ -109,8 +139,9 @@ def said(name: str) -> Said | None:
 
 def _readings(name: str) -> list[tuple[str | None, str]]:
     """Ways to part a name into a side and a rest, the likeliest first."""
-    last = name.rsplit(":", 1)[-1]
-    tokens = [t.casefold() for t in re.findall(r"[^\W\d_]?[a-zß-ÿ]+|[A-Z]+(?![a-z])|\d+", last)]
+    letters = unicodedata.normalize("NFKD", name.rsplit(":", 1)[-1].replace("ß", "ss"))
+    last = "".join(c for c in letters if not unicodedata.combining(c))  # Knöchel, malléole
+    tokens = [t.casefold() for t in re.findall(r"[^\W\d_]?[a-z]+|[A-Z]+(?![a-z])|\d+", last)]
     found: list[tuple[str | None, str]] = []
     for side, words in _WORDS.items():
         for k in (0, len(tokens) - 1, *range(1, len(tokens) - 1)):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -27,7 +27,7 @@ from dynakin.model.markers.draft.by_geometry import (
     segment_at,
 )
 from dynakin.model.markers.draft.by_name import Sure, places, said
-from dynakin.model.markers.match import is_unlabelled
+from dynakin.model.markers.match import MarkerMatch, is_unlabelled
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.recordings.frame import UPRIGHT
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, plain_name
@@ -38,13 +38,16 @@ from dynakin.recordings.standing import standing_window
 GUESSED = "guessed"
 """Name of the marker set of places that a recording's markers probably have."""
 _BONES = re.compile(r"^(PEL|[LR](?:FE|TI|FO|TO|CL|HU|RA|HN)|HED|TRX)[OALP]$")
-_COMPUTED = re.compile(r"cent(er|re)ofmass|ground$|virtual")
+_COMPUTED = re.compile(r"cent(er|re)ofmass|ground$|virtual|^mid(asis|psis|clavicle)")
 _LIKELY_MARGIN, _LEAST_MARGIN = 3.0, 1.0
 """By how much the next best place must fit worse (standard deviations squared). On 14 recordings of six laboratories
 with their names hidden 104 of 106 likely places are right, and 94 of 138 unsure ones; limits were set with them in
 view. Of six simulated persons 129 of 131 likely ones are right: how far people lean was chosen with these in view."""
 _FIRM_FIT, _FIT = 8.0, 9.0
 """Mean cost of a marker up to which the person stands as the list of places has it, and beyond which nobody does."""
+_FOLLOWED = ("pelvis", "thigh", "shank", "foot")
+"""Segments to which markers that a set does not know, and that mark no place, are added: those of an arm that a set
+leaves out (opencap's forearm) say little."""
 _RANK: dict[Sure, int] = {"sure": 0, "likely": 1, "unsure": 2}
 
 
@@ -115,6 +118,47 @@ def drafted(recording: Recording) -> MarkerSetFile | None:
         "clusters": {segment: [entry for entry, _ in own] for segment, own in clusters.items()},
     }
     return MarkerSetFile.model_validate(expanded(whole))
+
+
+def further(recording: Recording, match: MarkerMatch) -> list[Guess]:
+    """Guesses at names that a match does not know, as far as the name says them, the body agrees, and the place is free
+    and no other name's."""
+    if not match.unexplained:
+        return []
+    try:
+        guesses = guess_markers(recording)
+    except RecordingError:
+        return []  # names that differ by case alone: which is which nobody knows
+    left, taken = set(match.unexplained), {*match.names, *match.left_out}
+    claims = Counter((own.place, own.side) for name in left if (own := said(name)) is not None)
+    sided = {marker.name: not marker.centre for marker in match.marker_set.markers}
+    found = []
+    for guess in guesses:
+        if guess.recorded not in left or guess.sure == "unsure" or said(guess.recorded) is None:
+            continue
+        if guess.place is None:
+            fits = guess.segment in _FOLLOWED
+        else:
+            computed = anatomy()["places"][guess.place].get("landmark_only", False)
+            free = (guess.place, guess.side) not in taken and claims[guess.place, guess.side] == 1
+            fits = free and not computed and sided.get(guess.place, guess.side != "centre") == (guess.side != "centre")
+        if fits:
+            found.append(guess)
+    return found
+
+
+def names_of(guesses: list[Guess]) -> dict[str, Any]:
+    """Guesses as what a marker set's file has of ``places`` and ``clusters``, with names as they stand."""
+    places_, clusters = _contents(guesses)
+    return {
+        "places": {place: {g.side: [g.recorded] for g in own} for place, own in places_.items()},
+        "clusters": {
+            segment: [
+                {"name": f"{segment}, {own[0].recorded}", **{g.side: [g.recorded] for g in own}} for _, own in entries
+            ]
+            for segment, entries in clusters.items()
+        },
+    }
 
 
 def _standing(recording: Recording) -> tuple[list[str], Array]:
