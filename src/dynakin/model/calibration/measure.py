@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,15 +12,15 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
 from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
 from dynakin.model.calibration.completion import Completed, completed
+from dynakin.model.calibration.flat_feet import flat_slopes, never_flat, usual_slopes
 from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmark_markers import in_both, needed_markers, seen_together, table_markers
-from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
+from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
 from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, Legs, legs_in_motion
 from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
-from dynakin.model.markers.anatomy import standing_at
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.recognise import CORRECT, LEG, recognise
 from dynakin.model.markers.schema import MarkerSetFile
@@ -28,19 +28,13 @@ from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
 from dynakin.recordings.companions import another_person
-from dynakin.recordings.feet.contact import foot_contacts
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.results.naming import listed, words
-from dynakin.results.records import NEVER_FLAT
 from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
-
-_USUAL_OFF_DEG, _UNKNOWN_OFF_DEG = 5, 15
-"""Of the zero of an ankle's angle where heel and toes count as an adult's on a flat foot, and where there is no such
-line: by simulated walks 1 to 4 deg and 5 to 15."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +243,7 @@ def _landmarks(asked: Asked, marked: _Marked, still: _Still, messages: list[str]
     if not still.stands:
         flat, usual = finder.sole, usual_slopes(finder)
         finder.sole = usual | dict(flat)
-        messages += _never_flat(model, flat, usual, marked.chosen)
+        messages += never_flat(model, flat, usual, marked.chosen)
     landmarks = finder.find_in_space(standing)
     if asked.functional:
         landmarks, how_found = functional_landmarks(asked.functional, landmarks, finder, source, still.frames)
@@ -294,27 +288,6 @@ def _mass_and_height(asked: Asked, marked: _Marked, still: _Still, messages: lis
     return mass_kg, height_m
 
 
-def _never_flat(
-    model: ModelFile, flat: Collection[str], usual: Collection[str], chosen: Sequence[Candidate]
-) -> list[str]:
-    """Sentences on marked feet of a person who does not stand still, but for those of ``flat`` sides, whose heel and
-    toes show how they stand: the line between these is the usual one's, or there is none and the foot counts as flat in
-    a frame in which it may not be."""
-    marked = {candidate.segment for candidate in chosen}
-    own = [s.side for s in model.segments if s.side is not None and "foot" in s.parts and s.name in marked]
-    found = []
-    for off_deg, feet in (
-        (_USUAL_OFF_DEG, [f"the {side} foot" for side in own if side in usual and side not in flat]),
-        (_UNKNOWN_OFF_DEG, [f"the {side} foot" for side in own if side not in usual and side not in flat]),
-    ):
-        if feet:
-            found.append(
-                f"Warning: {NEVER_FLAT}{listed(feet)} (heel and toes together on the ground, or standing still): the "
-                f"zero of the ankle's angle may be {off_deg} deg off. Give a standing trial (--static)."
-            )
-    return found
-
-
 def _supposed_legs(found: Completed, legs: Legs, chosen: Sequence[Candidate]) -> list[str]:
     """Knees and ankles of marked segments that are where an adult who stands has them."""
     marked = {candidate.segment for candidate in chosen}
@@ -333,34 +306,6 @@ def _no_legs(supposed: Sequence[str], source: Trial, static: Recording | None, l
     if reasons := "; ".join(dict.fromkeys(whys)):
         return f"{match.where}: {said}, because markers are left out: {reasons}; expected the labels corrected."
     return " ".join([f"{source.match.where}: {said}; expected {expected}.", *legs.failed])
-
-
-def flat_slopes(trial: Trial) -> dict[str, float]:
-    """Side -> slope (rad) of the line from heel to toe while that foot stands flat; none for a foot that never does."""
-    found: dict[str, float] = {}
-    for side in SIDES:
-        names = trial.match.heel_toe(side)
-        own = {side: list(names)} if names else {}
-        contact = foot_contacts(trial.recording, trial.ground, own).get(side)
-        if contact is None or contact.touching.shape[1] != 2:
-            continue
-        flat = contact.touching.all(axis=1)
-        if flat.any():
-            heel, toe = (trial.ground.points_to_ground(trial.recording.marker(n)) for n in own[side])
-            found[side] = float(np.median(slope((toe - heel)[flat])))
-    return found
-
-
-def usual_slopes(finder: LandmarkFinder) -> dict[str, float]:
-    """Side -> slope (rad) of the line from heel to toe on an adult's flat foot, by the places that these are of."""
-    found: dict[str, float] = {}
-    for side in SIDES:
-        recipes = [finder.recipe(name, side) for name in ("heel", "toe")]
-        inputs = [recipe.inputs if recipe is not None else () for recipe in recipes]
-        if all(inputs) and all(name in standing_at() for names in inputs for name in names):
-            heel, toe = (np.mean([standing_at()[name][0] for name in names], axis=0) for names in inputs)
-            found[side] = float(slope(toe - heel))
-    return found
 
 
 def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: npt.NDArray[np.intp]) -> Trial:
