@@ -2,7 +2,7 @@
 
 The plate frame is that of the C3D user guide: corner 1 lies at (+x, +y), 2 at (-x, +y), 3 at (-x, -y), 4 at
 (+x, -y), and z = x cross y points into the floor. All files seen store the ground's reaction in it (F_z
-negative under a person); one that stores the person's action is recognised, as a plate cannot pull, and
+negative under a person); a plate that stores the person's action is recognised, as it cannot pull, and
 turned.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,11 +19,13 @@ from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plate_types import TYPES, plate_wrench
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
 from dynakin.units import force_factor, moment_factor
 
-_CERTAIN_LOAD_N = 50.0  # a push that no offset of an idle plate reaches: from it the sign is judged
+_CERTAIN_LOAD_N = 50.0  # a push that no offset of a plate in order reaches
+_LASTING_PULL = 0.02
 _CENTRED_M = 0.003
 _OFFSET_WORTH_A_NOTE_N = 5.0
 _MOST_PLATES = 100
@@ -86,9 +88,12 @@ def read_plates(
             continue
         raws.append(raw)
         notes += said
-    if raws and _stores_action(raws):
-        notes.append("The file stores the person's action on the plates; turned into the ground's reaction.")
-        raws = [_Raw(raw.name, -raw.force, -raw.moment, raw.surface, raw.corners) for raw in raws]
+    turned = pulling([raw.force @ raw.surface.normal for raw in raws])
+    notes += turned_in_words([raw.name for raw in raws], turned)
+    raws = [
+        replace(raw, force=-raw.force, moment=-raw.moment) if turn else raw
+        for raw, turn in zip(raws, turned, strict=True)
+    ]
     plates = []
     for raw in raws:
         notes += _offset_note(raw)
@@ -240,18 +245,15 @@ def _factors(
     return np.array(found), given
 
 
-def _stores_action(raws: Sequence[_Raw]) -> bool:
-    """Whether the most loaded plate is pushed into the person's side: then the file holds the person's
-    action."""
-    pushes = [raw.force @ raw.surface.normal for raw in raws]
-    push = max(pushes, key=lambda p: float(np.quantile(np.abs(p), 0.99)))
-    loaded = np.abs(push) > _CERTAIN_LOAD_N
-    return bool(loaded.any() and np.median(push[loaded]) < 0)
-
-
 def _offset_note(raw: _Raw) -> list[str]:
     push = raw.force @ raw.surface.normal
     idle = np.abs(push) < _CERTAIN_LOAD_N
+    pulls = push < -_CERTAIN_LOAD_N
+    if pulls.mean() > _LASTING_PULL:
+        return [
+            f"Warning: {raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in "
+            f"{100.0 * pulls.mean():.0f} % of the recording: taken as empty there. Zero it before the trial."
+        ]
     if idle.mean() < 0.05 or np.abs(np.median(push[idle])) < _OFFSET_WORTH_A_NOTE_N:
         return []
     return [f"{raw.name} reads {np.median(push[idle]):.3g} N where nobody stands on it (not taken off)."]
