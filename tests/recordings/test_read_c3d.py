@@ -239,6 +239,43 @@ def test_units_of_channels_and_metres(tmp_path: Path) -> None:
     np.testing.assert_allclose(read(mixed).total_wrench()[0], expected_wrench(R_LP), rtol=1e-5, atol=1e-2)
 
 
+@pytest.mark.parametrize(
+    ("force", "moment", "newtons", "newton_metres"),
+    [
+        ("lbf", "in-lbf", 4.4482216, 0.11298483),
+        ("kgf", "kgf.cm", 9.80665, 0.0980665),
+        ("kN", "kN*m", 1e3, 1e3),
+        ("furlong", "mN", 1.0, 1e-3),  # unknown, both
+    ],
+)
+def test_other_units_are_converted_and_unknown_ones_are_named(
+    tmp_path: Path, force: str, moment: str, newtons: float, newton_metres: float
+) -> None:
+    channels = channels_of(2)  # N, N mm
+    channels[:3] /= newtons
+    channels[3:] *= 1e-3 / newton_metres
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        body(),
+        kinds=[2],
+        channels=channels,
+        corners=[turned(R_LP)],
+        origins=[origin_of(2)],
+        analog_units=[force] * 3 + [moment] * 3,
+    )
+    recording = read(path)
+    np.testing.assert_allclose(recording.total_wrench()[5], expected_wrench(R_LP), rtol=1e-4, atol=2e-2)
+    said = [note for note in recording.notes if "unknown unit" in note]
+    assert said == (
+        [
+            "Warning: plate 1: unknown unit 'furlong' of its forces in ANALOG:UNITS, N taken.",
+            "Warning: plate 1: unknown unit 'mN' of its moments in ANALOG:UNITS, N times the unit of its points taken.",
+        ]
+        if force == "furlong"
+        else []
+    )
+
+
 def test_each_plate_is_kept_and_an_idle_one_is_zero(tmp_path: Path) -> None:
     idle = np.full_like(channels_of(2), 0.0)
     idle[2] = -6.0  # an offset below the threshold

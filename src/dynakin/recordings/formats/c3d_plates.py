@@ -135,7 +135,10 @@ def _raw(
             raise RecordingError(f"it has type {kind} and no calibration in FORCE_PLATFORM:CAL_MATRIX")
         kind = plain
         notes.append(f"{name} has no calibration in the file: its channels are taken as calibrated.")
-    factors, known = _factors(parameters, channels, unit_m, kind, calibration)
+    factors, known, strange = _factors(parameters, channels, unit_m, kind, calibration)
+    for signal, word in strange:
+        taken = "N" if signal == "force" else "N times the unit of its points"
+        notes.append(f"Warning: {name}: unknown unit {word!r} of its {signal}s in ANALOG:UNITS, {taken} taken.")
     if (
         calibration is None
         and TYPES[kind].outputs.count("moment") == 3
@@ -224,9 +227,9 @@ def _at_centre(wrench: Array) -> bool:
 
 def _factors(
     parameters: Parameters, channels: Sequence[int], unit_m: float, kind: int, calibration: Array | None
-) -> tuple[Array, bool]:
-    """Factor to N, N m or m of each output, and whether the file gives the moments' unit; by default forces are in N,
-    moments in N times the points' length unit.
+) -> tuple[Array, bool, list[tuple[str, str]]]:
+    """Factor to N, N m or m of each output, whether the file gives the moments' unit, and signals with a unit that is
+    not known; by default forces are in N, moments in N times the points' length unit.
 
     Channels that go through a calibration are in volts, so the unit is that of the calibration, which the file does
     not name: the default.
@@ -235,14 +238,16 @@ def _factors(
     outputs = TYPES[kind].outputs
     found = [factors[signal] for signal in outputs]
     if calibration is not None:
-        return np.array(found), False
-    words, given = parameters.texts("ANALOG", "UNITS"), True
+        return np.array(found), False, []
+    words, given, strange = parameters.texts("ANALOG", "UNITS"), True, dict[tuple[str, str], None]()
     for spot, (channel, signal) in enumerate(zip(channels, outputs, strict=True)):
         word = words[channel] if channel < len(words) else ""
         known = None if signal == "point" else force_factor(word) if signal == "force" else moment_factor(word)
         found[spot] = found[spot] if known is None else known
         given &= signal != "moment" or known is not None
-    return np.array(found), given
+        if word and known is None and signal != "point":
+            strange[signal, word] = None
+    return np.array(found), given, list(strange)
 
 
 def _offset_note(raw: _Raw) -> list[str]:
