@@ -164,6 +164,22 @@ def test_an_idle_plate_that_drifts_is_not_turned(tmp_path: Path) -> None:
     assert not any("action" in note for note in recording.notes)
 
 
+@pytest.mark.parametrize(
+    "names", [("POINT", "ANALOG", "FORCE_PLATFORM"), ("POINT", "USED", "RATE", "LABELS", "CORNERS")]
+)
+def test_names_of_groups_and_parameters_in_small_letters(tmp_path: Path, names: tuple[str, ...]) -> None:
+    path = two_plates(tmp_path, (ALL, SHORT))
+    expected, content = read(path), path.read_bytes()
+    for name in names:
+        content = content.replace(name.encode(), name.lower().encode())
+    path.write_bytes(content)
+    found = read(path)
+    assert found.marker_names == expected.marker_names and found.rate == expected.rate
+    for one, other in zip(found.plates, expected.plates, strict=True):
+        np.testing.assert_array_equal(one.force, other.force)
+        np.testing.assert_array_equal(one.cop, other.cop)
+
+
 def test_type_4_calibration_mixes_channels(tmp_path: Path) -> None:
     calibration = np.diag([500.0, 500, 1000, 2e5, 3e5, 1e5])
     calibration[0, 2] = 12.0  # asymmetric: rows are outputs
