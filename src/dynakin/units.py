@@ -23,7 +23,12 @@ _LENGTH = {
     0.0254: ("in", "inch", "inches"),
     0.3048: ("ft", "foot", "feet"),
 }
-_FORCE = {1.0: ("n", "newton", "newtons"), 1e3: ("kn", "kilonewton", "kilonewtons")}
+_FORCE = {
+    1.0: ("n", "newton", "newtons"),
+    1e3: ("kn", "kilonewton", "kilonewtons"),
+    4.4482216152605: ("lbf", "lb", "lbs", "pound", "pounds", "poundforce"),
+    GRAVITY_M_S2: ("kgf", "kp"),
+}
 
 
 def _clean(unit: str) -> str:
@@ -46,10 +51,10 @@ def force_factor(unit: str) -> float | None:
 
 
 def moment_factor(unit: str) -> float | None:
-    """Newton metres per ``unit`` ("Nm", "N.mm", "Newton millimetres", ...), or None where it is unknown."""
-    word = _clean(unit)
+    """Newton metres per ``unit`` ("Nm", "N.mm", "Newton millimetres", "in-lbf", ...), or None where it is unknown."""
+    word = _clean(unit)  # "mN" is a force
     for force, force_names in _FORCE.items():
         for length, length_names in _LENGTH.items():
-            if any(word == f + m for f in force_names for m in length_names):
+            if any(word in {f + m, m + f} - {"mn"} for f in force_names for m in length_names):
                 return force * length
     return None

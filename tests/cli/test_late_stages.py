@@ -92,6 +92,16 @@ def written(recording: Recording, folder: Path) -> list[str]:
     return [str(folder / "m.trc"), "--forces", str(folder / "f.mot")]
 
 
+def test_one_frame_is_refused_of_a_whole_body(squat: SimulatedTrial, tmp_path: Path, capsys: Said) -> None:
+    """`check` would have run it, and `run` said "cannot convert float NaN to integer"."""
+    trial = [*written(squat.recording.window(0.0, 0.0), tmp_path), "--mass", "70"]
+    assert main(["check", *trial]) == 1
+    said = capsys.readouterr().err
+    assert said == f"error: {tmp_path / 'm.trc'}: found 1 frame, expected at least 2: one shows no movement\n"
+    assert main(["run", *trial, "-o", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err == said
+
+
 def test_one_frame_gives_results_and_a_page(squat: SimulatedTrial, tmp_path: Path) -> None:
     """0.1 lost it all: ValueError in the page's player."""
     squat.save(tmp_path / "trial")

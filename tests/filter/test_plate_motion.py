@@ -126,6 +126,24 @@ def test_a_quarter_turn_is_named(data_dir: Path) -> None:
         person().prepare(turned)
 
 
+@pytest.mark.parametrize(
+    ("sign", "said"), [(-1.0, "are exchanged. "), (1.0, "are exchanged and point the other way. ")]
+)
+def test_horizontal_forces_that_are_exchanged_are_named(sign: float, said: str) -> None:
+    """A mirror: no turn of the axes gives it. The plates' axes lie a quarter turn from the laboratory's."""
+    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
+    level = [k for k in range(3) if k != up]
+
+    def change(force: np.ndarray) -> np.ndarray:
+        changed = force.copy()
+        changed[:, level] = sign * force[:, level[::-1]]
+        return changed
+
+    with pytest.raises(RecordingError, match=f"does not fit the motion: .* if the two horizontal forces {said}"):
+        person().prepare(with_forces(walk, change))
+
+
 def test_who_judges_takes_plates_in_step_too() -> None:
     """Held-out trials and identification ask for the plates by themselves."""
     whole = simulate("fullbody", "gait", 7, 4.0).recording

@@ -13,11 +13,11 @@ from dynakin.errors import ConfigError
 from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, REASONS, SHARED, SWING
-from dynakin.recordings.frame import GroundFrame, find_ground_frame
+from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.ground_plate import saturated
 from dynakin.recordings.recording import Plate, Recording
+from support.made_steps import FOOT_MARKERS, LABORATORY, MadePlate, lasting, steps, walk
 
-LABORATORY = GroundFrame(np.eye(3), np.zeros(3), "+Y", np.array([1.0, 0.0, 0.0]))
 T = 400
 TIME = np.arange(T) / 100.0
 FEET = {"R": 0.1, "L": -0.1}
@@ -106,6 +106,24 @@ def test_two_feet_on_one_plate_share_it_and_their_sum_is_what_was_measured() -> 
         loads.wrench[0, :, 1], [450.0, 150.0], rtol=1e-3
     )  # 0.05 lies at three quarters of -0.1 to 0.1
     assert any("Both feet stand on a" in text for text in loads.messages)
+
+
+@pytest.mark.parametrize("corners", [None, CORNERS - [0.0, 0.0, 0.2]])
+def test_feet_wide_apart_on_one_plate_share_it(corners: np.ndarray | None) -> None:
+    """Under neither foot, but between the two for as long as it is pressed."""
+    recording = walker({}, (plate("a", np.full(T, 600.0), at(0.01, 0.0), corners),))
+    wide = recording.markers * [1.0, 1.0, 1.8]
+    assert (foot_loads(replace(recording, markers=wide), LABORATORY, MARKERS).reason == SHARED).all()
+
+
+@pytest.mark.parametrize("edges", [True, False])
+def test_a_plate_that_is_off_its_place_stays_the_foots_that_leaves_it(edges: bool) -> None:
+    """At toe-off its centre of pressure then lies before that foot, on the way to the next one."""
+    feet = walk(4, 0.6, stance_s=0.8)
+    plates = [MadePlate(f"p{k}", (0.6 * k - 0.25, 0.6 * k + 0.25), moved=(0.08, 0.0), edges=edges) for k in range(4)]
+    made = steps(lasting(4, stance_s=0.8), feet, plates)
+    on = foot_loads(made.recording, LABORATORY, FOOT_MARKERS).on.any(axis=0)  # (F, P)
+    np.testing.assert_array_equal(on, [[True, False, True, False], [False, True, False, True]])
 
 
 def test_flight_is_measured_as_nothing_and_a_saturated_plate_is_not_measured() -> None:

@@ -15,7 +15,7 @@ from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.recording import Recording
-from support.made_recordings import standing
+from support.made_recordings import standing, unseen
 
 FEET = {"left": ["LHEE", "LTOE"], "right": ["RHEE", "RTOE"]}
 
@@ -146,6 +146,20 @@ def test_exchanged_plates_push_the_feet_apart(factor: float, turned: bool) -> No
     said = "the horizontal force of plate 1 and plate 2 pushes the feet apart or across: it lies 171 to 171 deg"
     assert (found is not None and found.startswith(said) and "or if the two were exchanged" in found) == turned
     assert (found is not None) == turned
+
+
+@pytest.mark.parametrize("hidden", [slice(0, 60), slice(0, 30)])
+def test_a_plate_is_not_held_against_the_other_foot_while_its_own_is_not_seen(hidden: slice) -> None:
+    """Loaded in the first 60 frames, in all or half of which nobody sees the foot on it."""
+    recording = standing(70.0)
+    left, right = recording.plates
+    pressed = (np.arange(recording.n_frames) < 60)[:, None]
+    right = replace(right, force=right.force * pressed, moment=right.moment * pressed)
+    found = check(unseen(recording, "RHEE", "RTOE", "RMT5", frames=hidden).with_plates((left, right)), 70.0)
+    assert found.refusal is None
+    said = " ".join(found.messages)
+    assert ("plate 2 bears load only while a foot is not seen" in said) == (hidden.stop == 60)
+    assert ("plate 2: centre of pressure under the right foot, 15 mm outside" in said) == (hidden.stop == 30)
 
 
 def test_without_standing_the_mass_is_only_told() -> None:

@@ -91,6 +91,13 @@ def test_a_drift_is_said_and_bears_nobody(drift_n: float) -> None:
     assert swings.any() and (loads.reason[swings, 1] == SWING).all()
 
 
+def test_a_drift_beyond_what_is_judged_shows_no_place() -> None:
+    """It rises above it while the last foot stands beside the plates, as if it came with that."""
+    made = walked(drift_n=70.0).recording
+    said = messages(made.with_plates(tuple(plate for plate in made.plates if plate.name != "p3")))
+    assert any("while no foot is near it" in t for t in said) and not any("off its place" in t for t in said)
+
+
 def test_a_drift_below_the_noise_is_not_said() -> None:
     assert messages(walked(drift_n=8.0).recording) == []
 

@@ -124,6 +124,62 @@ def test_all_types(tmp_path: Path, kind: int, sign: float, depth_sign: float, tu
     assert any("person's action" in note for note in recording.notes) == (sign < 0)
 
 
+def two_plates(tmp_path: Path, pushes: tuple[np.ndarray, np.ndarray]) -> Path:
+    """Two plates 1 m apart, each with these multiples (T * PER_FRAME,) of the usual wrench."""
+    places = [1e3 * (CENTRE + [at, 0.0, 0.0] + LOCAL_CORNERS @ R_LP.T) for at in (0.0, 1.0)]
+    return write_c3d(
+        tmp_path / "a.c3d",
+        body(),
+        kinds=[2, 2],
+        channels=np.vstack([channels_of(2) * push for push in pushes]),
+        corners=places,
+        origins=[origin_of(2)] * 2,
+    )
+
+
+ALL = np.ones(T * PER_FRAME)
+SHORT = np.where(np.arange(T * PER_FRAME) < 40, 1.0, 0.0)  # a step, then nobody
+
+
+@pytest.mark.parametrize("turned", [0, 1])
+def test_one_plate_of_the_opposite_sign_is_turned_and_named(tmp_path: Path, turned: int) -> None:
+    signs = [-1.0 if k == turned else 1.0 for k in range(2)]
+    recording = read(two_plates(tmp_path, (signs[0] * ALL, signs[1] * SHORT)))
+    for plate in recording.plates:
+        np.testing.assert_allclose(plate.force[0], R_LP @ FORCE_P, rtol=0.05)
+    assert [note for note in recording.notes if "action" in note] == [
+        f"The file stores the person's action on plate {turned + 1}, unlike its other plates; turned into the ground's "
+        "reaction."
+    ]
+
+
+def test_an_idle_plate_that_drifts_is_not_turned(tmp_path: Path) -> None:
+    """It has the sign of the loaded one; a long offset does not outweigh a short step."""
+    drift, offset = -0.15 * np.linspace(0.0, 1.0, T * PER_FRAME), np.where(SHORT > 0.0, 1.0, -0.1)
+    recording = read(two_plates(tmp_path, (ALL, drift)))
+    np.testing.assert_array_equal(recording.plates[1].force, 0.0)
+    assert any(note.startswith("Warning: plate 2 pulls by up to 120 N") for note in recording.notes)
+    recording = read(two_plates(tmp_path, (ALL, offset)))
+    np.testing.assert_allclose(recording.plates[1].force[0], R_LP @ FORCE_P, rtol=0.05)
+    assert not any("action" in note for note in recording.notes)
+
+
+@pytest.mark.parametrize(
+    "names", [("POINT", "ANALOG", "FORCE_PLATFORM"), ("POINT", "USED", "RATE", "LABELS", "CORNERS")]
+)
+def test_names_of_groups_and_parameters_in_small_letters(tmp_path: Path, names: tuple[str, ...]) -> None:
+    path = two_plates(tmp_path, (ALL, SHORT))
+    expected, content = read(path), path.read_bytes()
+    for name in names:
+        content = content.replace(name.encode(), name.lower().encode())
+    path.write_bytes(content)
+    found = read(path)
+    assert found.marker_names == expected.marker_names and found.rate == expected.rate
+    for one, other in zip(found.plates, expected.plates, strict=True):
+        np.testing.assert_array_equal(one.force, other.force)
+        np.testing.assert_array_equal(one.cop, other.cop)
+
+
 def test_type_4_calibration_mixes_channels(tmp_path: Path) -> None:
     calibration = np.diag([500.0, 500, 1000, 2e5, 3e5, 1e5])
     calibration[0, 2] = 12.0  # asymmetric: rows are outputs
@@ -197,6 +253,43 @@ def test_units_of_channels_and_metres(tmp_path: Path) -> None:
         analog_units=["N"] * 3 + ["N.m"] * 3,
     )
     np.testing.assert_allclose(read(mixed).total_wrench()[0], expected_wrench(R_LP), rtol=1e-5, atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("force", "moment", "newtons", "newton_metres"),
+    [
+        ("lbf", "in-lbf", 4.4482216, 0.11298483),
+        ("kgf", "kgf.cm", 9.80665, 0.0980665),
+        ("kN", "kN*m", 1e3, 1e3),
+        ("furlong", "mN", 1.0, 1e-3),  # unknown, both
+    ],
+)
+def test_other_units_are_converted_and_unknown_ones_are_named(
+    tmp_path: Path, force: str, moment: str, newtons: float, newton_metres: float
+) -> None:
+    channels = channels_of(2)  # N, N mm
+    channels[:3] /= newtons
+    channels[3:] *= 1e-3 / newton_metres
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        body(),
+        kinds=[2],
+        channels=channels,
+        corners=[turned(R_LP)],
+        origins=[origin_of(2)],
+        analog_units=[force] * 3 + [moment] * 3,
+    )
+    recording = read(path)
+    np.testing.assert_allclose(recording.total_wrench()[5], expected_wrench(R_LP), rtol=1e-4, atol=2e-2)
+    said = [note for note in recording.notes if "unknown unit" in note]
+    assert said == (
+        [
+            "Warning: plate 1: unknown unit 'furlong' of its forces in ANALOG:UNITS, N taken.",
+            "Warning: plate 1: unknown unit 'mN' of its moments in ANALOG:UNITS, N times the unit of its points taken.",
+        ]
+        if force == "furlong"
+        else []
+    )
 
 
 def test_each_plate_is_kept_and_an_idle_one_is_zero(tmp_path: Path) -> None:

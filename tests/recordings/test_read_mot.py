@@ -12,6 +12,7 @@ from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces, plates_from_table
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.read import read
+from dynakin.recordings.recording import Plate
 from dynakin.recordings.resampling import ReadOptions
 from support.made_recordings import TRC_TOP, grf_text, plain, write
 
@@ -136,6 +137,29 @@ def test_plates_of_every_spelling(tmp_path: Path, style: tuple[str, str]) -> Non
         np.testing.assert_allclose(plate.moment[0], gain * WRENCH_MOMENT)
         np.testing.assert_allclose(plate.cop[0], [0.2, 0.01, 0.3])
         np.testing.assert_allclose(plate.free_moment[0], [0, gain * 5, 0])
+
+
+def test_one_plate_of_the_opposite_sign_is_turned_and_named(tmp_path: Path) -> None:
+    """All of them the same way is left to the check, which knows what is up."""
+
+    def forces(*signs: float) -> tuple[tuple[Plate, ...], tuple[str, ...]]:
+        columns: dict[str, float] = {}
+        for p, sign in enumerate(signs, start=1):
+            columns |= {f"FP{p}_{q}": value * (sign if q[0] == "v" else 1.0) for q, value in QUANTITIES.items()}
+            columns |= {f"FP{p}_m{a}": value for a, value in zip("xyz", (0.0, 5.0 * sign, 0.0), strict=True)}
+        return plates_from_table(read_table(write(tmp_path, "a.mot", grf_text(np.arange(9) / 100, columns))))
+
+    plates, notes = forces(1.0, -0.9)
+    np.testing.assert_allclose(plates[1].force[0], 0.9 * plates[0].force[0])
+    np.testing.assert_allclose(plates[1].moment[0], 0.9 * plates[0].moment[0])
+    np.testing.assert_allclose(plates[1].free_moment[0], 0.9 * plates[0].free_moment[0])
+    assert notes == (
+        "The file stores the person's action on plate 2, unlike its other plates; turned into the ground's reaction.",
+    )
+    for signs in ((-1.0, -0.9), (1.0, -0.1)):
+        plates, notes = forces(*signs)
+        assert [np.sign(plate.force[0, 1]) for plate in plates] == [np.sign(sign) for sign in signs]
+        assert not notes
 
 
 def test_same_rate_passes_through_untouched(tmp_path: Path) -> None:

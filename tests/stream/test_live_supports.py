@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SWING, FootLoads
+from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, FootLoads
 from dynakin.recordings.standing import marker_velocities
 from dynakin.settings import presets
 from dynakin.stream.feet import LiveFeet
@@ -101,6 +101,13 @@ def test_a_box_and_a_foot_held_up_live() -> None:
     reason = np.concatenate([one.reason for one in now])
     assert (reason[time > 1.4, 0] == SWING).all()
     assert all(bool(one.total_known[0]) for one, t in zip(now, time, strict=True) if t > 1.4)
+
+
+def test_a_plate_that_is_off_its_place_stays_the_foots_that_leaves_it_live() -> None:
+    """At toe-off its centre of pressure then lies before that foot, on the way to the next one."""
+    plates = [MadePlate(f"p{k}", (0.6 * k - 0.25, 0.6 * k + 0.25), moved=(0.08, 0.0)) for k in range(4)]
+    now = live(steps(lasting(4, stance_s=0.8), walk(4, 0.6, stance_s=0.8), plates))
+    assert not (np.concatenate([one.reason for one in now]) == SHARED).any()
 
 
 def test_stance_rises_and_falls_live() -> None:

@@ -233,7 +233,10 @@ class Estimator:
         """
         lag_s, unsmoothed = known_lag(lag_s, self.noise)
         recording = recording.without_empty_ends()
-        if problem := rate_problem(recording.time):
+        problem = rate_problem(recording.time)
+        if recording.n_frames < 2 and self.model.floating:
+            problem = f"found {recording.n_frames} frame, expected at least 2: one shows no movement"
+        if problem:
             raise RecordingError(f"{recording.path or recording.name}: {problem}")
         calibrated = self.calibrate(recording, static=static)
         markers, wrench, ground = self._measured(recording, calibrated)

@@ -265,10 +265,17 @@ def _check_pressure(
     hidden: Sequence[str],
     findings: _Findings,
 ) -> str | None:
-    """Compare with the feet; gives the foot that stands on the plate (``owner``, the nearest one where none is known),
-    None where both or none do, or one without markers (``hidden``) may."""
+    """Compare with the feet while all of them are seen; gives the foot that stands on the plate (``owner``, the nearest
+    one where none is known), None where both or none do, or one without markers (``hidden``) may."""
+    if not feet:
+        return None
+    seen = np.all([np.isfinite(outline[:, :, 0]).any(axis=1) for outline in feet.values()], axis=0)
+    if not seen[loaded].any():
+        findings.say(f"{plate.name} bears load only while a foot is not seen: nothing is held against its place.")
+        return owner
+    loaded = loaded[seen[loaded]]
     cop = ground.points_to_ground(plate.cop[loaded])[:, [0, 2]]
-    if not feet or not np.isfinite(cop).any():
+    if not np.isfinite(cop).any():
         return None
     distances = {foot: distance_to_hull(cop, outline[loaded]) for foot, outline in feet.items()}
     medians = {foot: float(np.nanmedian(d)) for foot, d in distances.items() if np.isfinite(d).any()}

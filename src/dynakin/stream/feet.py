@@ -91,6 +91,7 @@ class LiveFeet:
         self._floor_m = float(initial.ground.points_to_ground(np.zeros(3))[1])  # streams put plates there, too
         self._touched = np.full(F, -np.inf)  # when the foot last stood
         self._near, self._loaded = np.zeros((F, P), dtype=int), np.zeros((F, P), dtype=int)  # frames of this stance
+        self._between, self._press = np.zeros(P, dtype=int), np.zeros(P, dtype=int)  # frames of this press
         self._owners = np.zeros((F, P), dtype=bool)  # of the plates that are pressed
         self._range = _Range(P)
         self._closure: LiveClosure | None = None
@@ -288,13 +289,16 @@ class LiveFeet:
         near = away < NEAR_M
         self._under = near.copy()
         apart = np.isfinite(away).any(axis=0) & (away.min(axis=0) > BETWEEN_M)
+        loaded = np.array([plate.loaded[0] for plate in plates])
+        self._press += loaded
         if touches.all() and apart.any():
             both = np.broadcast_to(outlines.reshape(1, -1, 2), (P, outlines.size // 2, 2))
-            near |= apart & (distance_to_hull(cops, both) < BETWEEN_M)
+            between = apart & (distance_to_hull(cops, both) < BETWEEN_M)
+            self._between += between
+            near |= between & (2 * self._between > self._press)
         for p, foot in self._assigned.items():
             near[:, p] = np.arange(F) == foot
         near[:, list(self._given)] = False
-        loaded = np.array([plate.loaded[0] for plate in plates])
         self._loaded += touches[:, None] & loaded
         self._near += touches[:, None] & loaded & near
         mine = self._majority() & bears[:, None]
@@ -302,6 +306,7 @@ class LiveFeet:
             push = float(plate.wrench[0, 1])
             if push <= UNLOADED_N:
                 self._owners[:, p] = False
+                self._between[p] = self._press[p] = 0
             elif p in self._assigned:
                 self._owners[:, p] = near[:, p]
             elif mine[:, p].any():

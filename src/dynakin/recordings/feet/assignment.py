@@ -31,7 +31,8 @@ from dynakin.recordings.recording import Array, Recording
 Flags = npt.NDArray[np.bool_]
 
 BETWEEN_M = 0.03
-"""How far from both feet a centre of pressure lies that neither bears alone, where a plate's edges are not known."""
+"""How far from both feet a centre of pressure lies that neither bears alone, for most of a press: at toe-off it may lie
+as far before a foot whose plate, or whose markers, are a little off their place, in a tenth to a fourth of it."""
 BEYOND_M = 0.04
 """How far a touching marker may lie beyond the plates' edges: it sits on the shoe, not on its sole."""
 STEP_S = 0.25
@@ -260,15 +261,21 @@ class _Assignment:
         return found
 
     def between(self, k: int, p: int) -> Flags:
-        """Frames in which a plate's centre of pressure lies between two standing feet, and under neither."""
+        """Frames in which a plate's centre of pressure lies between two standing feet, and under neither: of presses of
+        which most do, and where some of this foot is on the plate, as far as its edges are known."""
         others = [c for name, c in self.contacts.items() if name != self.feet[k]]
         own = self.contacts.get(self.feet[k])
         if own is None or len(others) != 1:
             return np.zeros(self.recording.n_frames, dtype=bool)
-        cop, other = self.plates[p].cop, others[0]
+        plate, other = self.plates[p], others[0]
         both = np.concatenate([own.outline, other.outline], axis=1)
-        apart = np.fmin(distance_to_hull(cop, own.outline), distance_to_hull(cop, other.outline)) > BETWEEN_M
-        return np.asarray((distance_to_hull(cop, both) < BETWEEN_M) & apart & own.stands & other.stands)
+        away = [distance_to_hull(plate.cop, outline) for outline in (own.outline, other.outline, both)]
+        found = (np.fmin(away[0], away[1]) > BETWEEN_M) & (away[2] < BETWEEN_M) & own.stands & other.stands
+        if plate.corners is not None:
+            found &= (plate.beyond(own.outline) < BEYOND_M).any(axis=1)
+        for first, end in runs(plate.pressed):
+            found[first:end] &= 2 * np.count_nonzero(found[first:end]) > np.count_nonzero(plate.loaded[first:end])
+        return np.asarray(found)
 
     def upon(self, plate: GroundPlate, foot: FootContact, frames: slice) -> Flags:
         """Frames in which all touching markers of a foot lie within a plate's edges, on its level, or higher where no

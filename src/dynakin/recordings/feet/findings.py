@@ -28,6 +28,8 @@ TOGETHER = 0.7
 """Part of a press in which a foot must stand, and the other way round, for the two to belong together."""
 FITS, MISFITS = 0.8, 0.3
 """Part of a plate's load that must lie under feet once plates are exchanged, and may at most before."""
+MOST_DRIFT_N = 2.0 * JUDGED_N
+"""What a plate reads beside the load, at most: a press that stays below it may be nobody's, and shows no place."""
 CLEAR_S = 0.5
 """How long no foot must be near a plate for a drift to be said."""
 CLEAR_M = 0.3
@@ -107,6 +109,8 @@ def _off_place(
     offsets: dict[int, list[Array]] = {}
     for first, end in runs(plate.push > JUDGED_N):
         press = slice(first, end)
+        if plate.push[press].max() < MOST_DRIFT_N:
+            continue
         for k, foot in enumerate(contacts):
             assert foot is not None
             others = np.delete(on, p, axis=2)[press, k].any(axis=1).mean() > 1.0 - TOGETHER
@@ -152,7 +156,7 @@ def _drift(time: Array, plate: GroundPlate, soles: Soles, owners: Flags) -> str 
         return None
     read = plate.wrench[clear, 1]
     low, middle, high = np.percentile(read, (5.0, 50.0, 95.0))
-    if not UNLOADED_N < abs(middle) < 2.0 * JUDGED_N:
+    if not UNLOADED_N < abs(middle) < MOST_DRIFT_N:
         return None
     return (
         f"Warning: {plate.name} reads {low:.0f} to {high:.0f} N while no foot is near it, between {time[clear][0]:.2f} "

@@ -2,7 +2,7 @@
 
 The plate frame is that of the C3D user guide: corner 1 lies at (+x, +y), 2 at (-x, +y), 3 at (-x, -y), 4 at
 (+x, -y), and z = x cross y points into the floor. All files seen store the ground's reaction in it (F_z
-negative under a person); one that stores the person's action is recognised, as a plate cannot pull, and
+negative under a person); a plate that stores the person's action is recognised, as it cannot pull, and
 turned.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,11 +19,13 @@ from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plate_types import TYPES, plate_wrench
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
 from dynakin.units import force_factor, moment_factor
 
-_CERTAIN_LOAD_N = 50.0  # a push that no offset of an idle plate reaches: from it the sign is judged
+_CERTAIN_LOAD_N = 50.0  # a push that no offset of a plate in order reaches
+_LASTING_PULL = 0.02
 _CENTRED_M = 0.003
 _OFFSET_WORTH_A_NOTE_N = 5.0
 _MOST_PLATES = 100
@@ -86,9 +88,12 @@ def read_plates(
             continue
         raws.append(raw)
         notes += said
-    if raws and _stores_action(raws):
-        notes.append("The file stores the person's action on the plates; turned into the ground's reaction.")
-        raws = [_Raw(raw.name, -raw.force, -raw.moment, raw.surface, raw.corners) for raw in raws]
+    turned = pulling([raw.force @ raw.surface.normal for raw in raws])
+    notes += turned_in_words([raw.name for raw in raws], turned)
+    raws = [
+        replace(raw, force=-raw.force, moment=-raw.moment) if turn else raw
+        for raw, turn in zip(raws, turned, strict=True)
+    ]
     plates = []
     for raw in raws:
         notes += _offset_note(raw)
@@ -130,7 +135,10 @@ def _raw(
             raise RecordingError(f"it has type {kind} and no calibration in FORCE_PLATFORM:CAL_MATRIX")
         kind = plain
         notes.append(f"{name} has no calibration in the file: its channels are taken as calibrated.")
-    factors, known = _factors(parameters, channels, unit_m, kind, calibration)
+    factors, known, strange = _factors(parameters, channels, unit_m, kind, calibration)
+    for signal, word in strange:
+        taken = "N" if signal == "force" else "N times the unit of its points"
+        notes.append(f"Warning: {name}: unknown unit {word!r} of its {signal}s in ANALOG:UNITS, {taken} taken.")
     if (
         calibration is None
         and TYPES[kind].outputs.count("moment") == 3
@@ -219,9 +227,9 @@ def _at_centre(wrench: Array) -> bool:
 
 def _factors(
     parameters: Parameters, channels: Sequence[int], unit_m: float, kind: int, calibration: Array | None
-) -> tuple[Array, bool]:
-    """Factor to N, N m or m of each output, and whether the file gives the moments' unit; by default forces are in N,
-    moments in N times the points' length unit.
+) -> tuple[Array, bool, list[tuple[str, str]]]:
+    """Factor to N, N m or m of each output, whether the file gives the moments' unit, and signals with a unit that is
+    not known; by default forces are in N, moments in N times the points' length unit.
 
     Channels that go through a calibration are in volts, so the unit is that of the calibration, which the file does
     not name: the default.
@@ -230,28 +238,27 @@ def _factors(
     outputs = TYPES[kind].outputs
     found = [factors[signal] for signal in outputs]
     if calibration is not None:
-        return np.array(found), False
-    words, given = parameters.texts("ANALOG", "UNITS"), True
+        return np.array(found), False, []
+    words, given, strange = parameters.texts("ANALOG", "UNITS"), True, dict[tuple[str, str], None]()
     for spot, (channel, signal) in enumerate(zip(channels, outputs, strict=True)):
         word = words[channel] if channel < len(words) else ""
         known = None if signal == "point" else force_factor(word) if signal == "force" else moment_factor(word)
         found[spot] = found[spot] if known is None else known
         given &= signal != "moment" or known is not None
-    return np.array(found), given
-
-
-def _stores_action(raws: Sequence[_Raw]) -> bool:
-    """Whether the most loaded plate is pushed into the person's side: then the file holds the person's
-    action."""
-    pushes = [raw.force @ raw.surface.normal for raw in raws]
-    push = max(pushes, key=lambda p: float(np.quantile(np.abs(p), 0.99)))
-    loaded = np.abs(push) > _CERTAIN_LOAD_N
-    return bool(loaded.any() and np.median(push[loaded]) < 0)
+        if word and known is None and signal != "point":
+            strange[signal, word] = None
+    return np.array(found), given, list(strange)
 
 
 def _offset_note(raw: _Raw) -> list[str]:
     push = raw.force @ raw.surface.normal
     idle = np.abs(push) < _CERTAIN_LOAD_N
+    pulls = push < -_CERTAIN_LOAD_N
+    if pulls.mean() > _LASTING_PULL:
+        return [
+            f"Warning: {raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in "
+            f"{100.0 * pulls.mean():.0f} % of the recording: taken as empty there. Zero it before the trial."
+        ]
     if idle.mean() < 0.05 or np.abs(np.median(push[idle])) < _OFFSET_WORTH_A_NOTE_N:
         return []
     return [f"{raw.name} reads {np.median(push[idle]):.3g} N where nobody stands on it (not taken off)."]

@@ -12,6 +12,7 @@ description, its length first.
 from __future__ import annotations
 
 import math
+import re
 import struct
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,10 @@ from dynakin.files import require_file
 _TYPES = {-1: 1, 1: 1, 2: 2, 4: 4}  # text, byte, integer, float: bytes per value
 _MAX_DIMENSIONS = 7
 _MAX_DESCRIPTION = 127  # ezc3d reads the length as a signed byte
+_ASKED = re.compile(
+    rb"POINT|ANALOG|FORCE_PLATFORM|ROTATION|SHADOW|USED|RATE|RATIO|FRAMES|DATA_START|GEN_SCALE|FORMAT|BITS"
+    rb"|(LABELS|DESCRIPTIONS|UNITS|SCALE|OFFSET)[0-9]*|TYPE|ZERO|CORNERS|ORIGIN|CHANNEL|CAL_MATRIX"
+)  # what it does not find it adds, empty
 _MOST_PADDING = 3  # bytes: some programs begin their records at even or at fourth bytes
 
 
@@ -63,8 +68,9 @@ Groups = dict[str, dict[str, Record]]
 
 
 def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[Groups, list[Correction]]:
-    """Parameters by group and name, upper case, and the section written anew where ezc3d could not read it: records
-    with a few bytes of padding behind them, descriptions of 128 characters or more (these are cut).
+    """Parameters by group and name, upper case, and the section written anew where ezc3d could not read it: names in
+    small letters, records with a few bytes of padding behind them, descriptions of 128 characters or more (these are
+    cut).
 
     Args:
         section: bytes from the start of the parameter section to where the data begin.
@@ -105,7 +111,12 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[
         description = _take(inside, end + 1, length, start, path, what)[:_MAX_DESCRIPTION]
         content = section[here + 2 : end] + bytes([len(description)]) + description
         end += 1 + length
-        anew += section[at:here] + struct.pack("<H", (2 + len(content)) if offset else 0) + content
+        anew += (
+            section[at : at + 2]
+            + _in_capitals(section[at + 2 : here])
+            + struct.pack("<H", (2 + len(content)) if offset else 0)
+            + content
+        )
         if offset == 0:
             break
         if not end <= following <= end + _MOST_PADDING:  # ezc3d refuses that too, but does not say where
@@ -119,6 +130,11 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[
         groups.setdefault(name, found.get(number, {}))  # of two groups with one name ezc3d takes the first
     same = section.startswith(anew)
     return groups, [] if same else [(start, bytes(anew.ljust(len(section), b"\0")))]
+
+
+def _in_capitals(name: bytes) -> bytes:
+    """A name that ezc3d asks for as it asks for it; any other as it is, so that most files need no copy."""
+    return name.upper() if _ASKED.fullmatch(name.upper()) else name
 
 
 def _parameter(section: bytes, at: int, start: int, path: Path, what: str, dec: bool) -> tuple[Record, int]:

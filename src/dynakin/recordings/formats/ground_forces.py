@@ -11,6 +11,7 @@ from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.resampling import ReadOptions, low_pass, resample, same_times
 
@@ -46,7 +47,22 @@ def plates_from_table(table: Table) -> tuple[tuple[Plate, ...], tuple[str, ...]]
         plate, note = _plate(group, table)
         plates.append(plate)
         notes += note
-    return tuple(plates), tuple(notes)
+    plates, said = _one_sign(plates)
+    return tuple(plates), tuple(notes + said)
+
+
+def _one_sign(plates: list[Plate]) -> tuple[list[Plate], list[str]]:
+    """The plates with those turned that pull while others push, along the axis that carries the most; all of them the
+    same way is left to the check, which knows what is up."""
+    sizes = np.sum([np.abs(np.nan_to_num(plate.force)).sum(axis=0) for plate in plates], axis=0)
+    turned = pulling([plate.force[:, int(np.argmax(sizes))] for plate in plates])
+    if turned.all():
+        return plates, []
+    found = [
+        replace(plate, force=-plate.force, moment=-plate.moment, free_moment=-plate.free_moment) if turn else plate
+        for plate, turn in zip(plates, turned, strict=True)
+    ]
+    return found, turned_in_words([plate.name for plate in plates], turned)
 
 
 def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[str]]:

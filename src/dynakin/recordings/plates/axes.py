@@ -17,6 +17,8 @@ TURNS: tuple[tuple[str, Array], ...] = (
     ("both horizontal axes point the other way (half a turn)", -np.eye(2)),
     ("the horizontal axes are turned by a quarter turn", np.array([[0.0, -1.0], [1.0, 0.0]])),
     ("the horizontal axes are turned by a quarter turn", np.array([[0.0, 1.0], [-1.0, 0.0]])),
+    ("the two horizontal forces are exchanged", np.array([[0.0, 1.0], [1.0, 0.0]])),
+    ("the two horizontal forces are exchanged and point the other way", np.array([[0.0, -1.0], [-1.0, 0.0]])),
 )
 AWAY_DEG, ALONG_DEG, APART_S = 70.0, 45.0, 0.5
 """While several plates are loaded the ground pushes each foot towards the others. Of 17 real recordings (standing,
