@@ -25,7 +25,7 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import compute_metrics
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, wrench_sources
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, out_of_sight, wrench_sources
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 from support.estimates.walking import make_walker
@@ -365,3 +365,32 @@ def test_beside_something_undeclared_a_foot_off_its_plate_is_absent() -> None:
     assert (foot_sources(found)[:, 0] == MEASURED).all()
     lacking = np.isnan(found["moments"].sel(coordinate="arm_flex_l").values)
     np.testing.assert_array_equal(lacking, undeclared)
+
+
+def test_what_nobody_sees_for_longer_than_a_gap_is_absent() -> None:
+    """A shank and what hangs on it; a foot that is missing while its shank is seen takes its ankle along only."""
+    data = make_walker((2,)).data
+    data = data.assign_coords(coordinate_segment=("coordinate", ["pelvis", "shank_r", "shank_l", *["upper_arm_r"] * 2]))
+    time, segments = data["time"].values, [str(name) for name in data["joint_segment"].values]
+    owners = ["pelvis", "shank_r", "shank_r", "foot_r", "shank_l", "foot_l", "foot_l", "upper_arm_r"]
+    seen = np.ones((len(time), len(owners)), dtype=bool)
+    long, short = (time > 1.0) & (time < 1.5), (time > 2.0) & (time < 2.1)
+    seen[long | short, 1:4] = False
+    seen[long, 4] = False  # the left foot is seen
+    hidden = out_of_sight(seen, owners, time)
+    np.testing.assert_array_equal(hidden["shank_r"], long)
+    feet: Any = SimpleNamespace(contact=np.zeros_like(data["foot_contact"].values), segments=("foot_r", "foot_l"))
+    found = with_sources(data, feet, np.zeros(len(time), dtype=bool), hidden=hidden)
+    lacking = {segments[k] for k in np.flatnonzero((found["joint_source"].values == ABSENT)[long].all(axis=0))}
+    assert lacking == {"shank_r", "foot_r"}
+    names = [str(name) for name in data["coordinate"].values]
+    own = data["coordinate_segment"].values == "shank_r"
+    np.testing.assert_array_equal(np.isnan(found["moments"].values[:, own]).all(axis=1), long)
+    np.testing.assert_array_equal(np.isnan(found["coordinates_sd"].values[:, own]).all(axis=1), long)
+    assert names and np.isfinite(found["coordinates_sd"].values[:, ~own]).all()
+
+
+def test_a_segment_that_never_has_a_marker_in_sight_is_no_gap() -> None:
+    time = np.arange(100) / 100.0
+    hidden = out_of_sight(np.zeros((100, 1), dtype=bool), ["shank_r"], time)
+    assert not hidden["shank_r"].any()

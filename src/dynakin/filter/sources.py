@@ -13,7 +13,7 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NO_CONTACT
 from dynakin.results.estimate import values_of
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, contact_sources
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, Hidden, contact_sources
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +29,7 @@ def with_sources(
     soles: Collection[str] = (),
     held: Collection[str] = (),
     unmarked: Collection[str] = (),
+    hidden: Hidden | None = None,
 ) -> xr.Dataset:
     """The dataset of an estimate with ``foot_source``, ``moment_source`` and ``joint_source``, and NaN where absent.
 
@@ -43,6 +44,8 @@ def with_sources(
         undeclared: (T,) frames in which something bears the person that no plate measures.
         soles: segments on which the ground acts. held: coordinates that no marker shows, of which nothing is known.
         unmarked: those of ``soles`` that no marker shows: what they carry is absent, with all that lies before it.
+        hidden: as of `out_of_sight`: while nothing of a segment is seen, nor of what hangs on it, its joint's moments
+            are absent and nothing is known of its angles.
     """
     import xarray as xr  # as in `assemble`
 
@@ -66,12 +69,15 @@ def with_sources(
     joints[np.ix_(undeclared, ~legs)] = ABSENT
     if feet is not None:
         joints[_beyond(feet, soles, segments, parents)] = ABSENT
+    gone = _gone(hidden or {}, segments, parents, len(joints))
+    joints[gone] = ABSENT
     moments[joints[:, moved] == ABSENT] = ABSENT
     moments[:, np.isin(data["coordinate"].values, list(held))] = ABSENT
     known, carried = moments != ABSENT, joints != ABSENT
     found["moment_source"] = (("time", "coordinate"), moments.astype(np.uint8))
     found["joint_source"] = (("time", "joint"), joints.astype(np.uint8))
-    seen = xr.DataArray(~np.isin(data["coordinate"].values, list(held)), dims="coordinate")
+    shown = ~np.isin(data["coordinate"].values, list(held)) & ~gone[:, moved]
+    seen = xr.DataArray(shown, dims=("time", "coordinate"))
     for name in ("coordinates_sd", "speeds_sd", "accelerations_sd"):
         if name in data:
             found[name] = data[name].where(seen)  # held where nobody sees it is not known for sure
@@ -79,6 +85,19 @@ def with_sources(
         found[name] = data[name].where(xr.DataArray(known, dims=("time", "coordinate")))
     found["joint_loads"] = data["joint_loads"].where(xr.DataArray(carried, dims=("time", "joint")))
     return data.assign(found)  # all at once: each time takes 10 ms
+
+
+def _gone(hidden: Hidden, segments: list[str], parents: npt.NDArray[np.int_], frames: int) -> Flags:
+    """(T, J) joints of which nothing is seen that they move, but for the root's."""
+    unseen, marked = np.ones((frames, len(segments)), dtype=bool), np.zeros(len(segments), dtype=bool)
+    for k in reversed(range(len(segments))):  # parents stand before their children
+        if segments[k] in hidden:
+            unseen[:, k] &= hidden[segments[k]]
+            marked[k] = True
+        if parents[k] >= 0:
+            unseen[:, parents[k]] &= unseen[:, k]
+            marked[parents[k]] |= marked[k]
+    return np.asarray(unseen & marked & (parents >= 0))
 
 
 class ContactSources:

@@ -95,13 +95,13 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
     return Started(replace(plan, start=fit.coordinates), speeds, messages, held)
 
 
-def _postures(model: _core.Model, paths: Array, limits: dict[str, Interval]) -> list[tuple[Array, Array]]:
-    """States fitted to some frames that show enough markers, and these markers."""
-    found: list[tuple[Array, Array]] = []
+def _postures(model: _core.Model, paths: Array, limits: dict[str, Interval]) -> list[Array]:
+    """States fitted to some frames that show enough markers."""
+    found: list[Array] = []
     for frame in _spread(np.flatnonzero(_enough(paths)), _FRAMES):
-        guess = found[-1][0] if found else None
+        guess = found[-1] if found else None
         fit = start_posture(model, paths[frame], guess=guess, limits=limits, good_m=_FAIR_M, bad_m=np.inf, where="")
-        found.append((fit.x, paths[frame]))
+        found.append(fit.x)
     return found
 
 

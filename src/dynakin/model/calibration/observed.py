@@ -25,14 +25,15 @@ show is a forearm by two markers at its wrist (0.14); by joint centres alone the
 _ALIKE_RAD = np.deg2rad(5.0)
 
 
-def hold_unseen(plan: ModelPlan, postures: list[tuple[Array, Array]]) -> tuple[ModelPlan, dict[str, str]]:
+def hold_unseen(plan: ModelPlan, postures: list[Array]) -> tuple[ModelPlan, dict[str, str]]:
     """The plan with the coordinates locked where they stand that its markers do not show, and why, by coordinate.
 
     Of several that can stand for each other the one furthest from the root is held first. Coordinates of the root
-    never are: something moves the body.
+    never are: something moves the body. All markers count, also those that some frames miss: what is not seen for a
+    time is the filter's to hold.
 
     Args:
-        postures: states (n,) of the plan's model at some frames, and the markers (M, 3) seen there, NaN where not.
+        postures: states (n,) of the plan's model at some frames.
     """
     held: dict[str, str] = {}
     depth = _depths(plan)
@@ -41,10 +42,7 @@ def hold_unseen(plan: ModelPlan, postures: list[tuple[Array, Array]]) -> tuple[M
     free = free_names(model.spec)
     loose = np.array([site.soft_tissue_m >= LOOSE_FROM_M for site in plan.sites])
     sd_m = np.repeat(np.where(loose, LOOSE_SD_M, MARKER_SD_M), 3)
-    jacobians = [
-        (_core.marker_jacobian(model, x)[:, : len(free)] / sd_m[:, None])[np.isfinite(markers).ravel()]
-        for x, markers in postures
-    ]
+    jacobians = [_core.marker_jacobian(model, x)[:, : len(free)] / sd_m[:, None] for x in postures]
     prior = np.array([PRIOR_SD_RAD if kinds[name] == "rotation" else PRIOR_SD_M for name in free])
     kept = np.ones(len(free), dtype=bool)
     while True:

@@ -9,6 +9,7 @@ from dynakin.report.findings.finding import Insight, Level, Metrics
 from dynakin.report.labels import short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import marker_sites
+from dynakin.results.measures.sources import out_of_sight
 from dynakin.results.naming import listed, sentence, words
 from dynakin.results.records import MISPLACED, NEVER_FLAT, REFUSED, WARNING, doubts_mass, warnings_of
 
@@ -23,9 +24,6 @@ _SAID_ELSEWHERE = (
     " clamps them",
 )
 _SUBJECT = ("mass ", "height ")
-# Longest time, s, without any marker of a segment over which its motion is carried on: by truth a foot in a walk is 20
-# to 30 deg off after 0.3 s.
-UNSEEN_S = 0.2
 # A sensor that is refused for less than this, s, is a note.
 BRIEF_S = 0.1
 
@@ -114,20 +112,11 @@ def missing(estimate: Estimate, metrics: Metrics) -> Insight | None:
 
 def _unseen(estimate: Estimate) -> dict[str, str]:
     """Segments, and the times in which none of their markers is seen although some are at other times."""
-    segments = estimate.marker_segments
-    owners = np.array([segments.get(site, "") for _, site in marker_sites(estimate)])
-    seen = np.isfinite(estimate.values("markers_measured")).any(axis=2)
-    found: dict[str, str] = {}
-    for segment in dict.fromkeys(owners[owners != ""]):
-        hidden = ~seen[:, owners == segment].any(axis=1)
-        spans = [
-            f"{estimate.time[a]:.2f} to {estimate.time[b - 1]:.2f} s"
-            for a, b in runs(hidden)
-            if estimate.time[b - 1] - estimate.time[a] > UNSEEN_S
-        ]
-        if spans and not hidden.all():
-            found[str(segment)] = listed(spans, 3)
-    return found
+    segments, time = estimate.marker_segments, estimate.time
+    owners = [segments.get(site, "") for _, site in marker_sites(estimate)]
+    hidden = out_of_sight(np.isfinite(estimate.values("markers_measured")).any(axis=2), owners, time)
+    spans = {name: [f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(own)] for name, own in hidden.items()}
+    return {name: listed(own, 3) for name, own in spans.items() if own}
 
 
 def gated(estimate: Estimate, metrics: Metrics) -> Insight | None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import runs
 from dynakin.recordings.feet.contact import SHARED_PLATE, UNMEASURED
 from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.naming import listed, sentence, words
@@ -24,6 +25,11 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
+Hidden = dict[str, npt.NDArray[np.bool_]]
+
+UNSEEN_S = 0.2
+"""Longest time without any marker of a segment over which its motion is carried on: by truth a foot in a walk is 20 to
+30 deg off after 0.3 s."""
 
 MEASURED, DERIVED, PRIOR, ABSENT = range(4)
 """Codes of ``moment_source``, ``joint_source`` and ``foot_source``, the worse the larger."""
@@ -54,6 +60,22 @@ def moment_sources(data: xr.Dataset) -> Codes:
 def joint_sources(data: xr.Dataset) -> Codes:
     """(T, J) of the loads of the joints; components out of a planar model's plane do not count."""
     return _sources(data, "joint_source", "joint_loads", "joint")
+
+
+def out_of_sight(seen: npt.NDArray[np.bool_], owners: Sequence[str], time: npt.NDArray[np.float64]) -> Hidden:
+    """Segment with markers -> (T,) frames that lie in a stretch of more than `UNSEEN_S` in which none of them is seen;
+    of one of which none ever is, no frame.
+
+    Args:
+        seen: (T, M) the markers. owners: (M,) their segments.
+    """
+    found: Hidden = {}
+    for segment in dict.fromkeys(name for name in owners if name):
+        own = np.asarray(~seen[:, [name == segment for name in owners]].any(axis=1))
+        found[segment] = np.zeros(len(time), dtype=bool)
+        for first, end in runs(own):
+            found[segment][first:end] = time[end - 1] - time[first] > UNSEEN_S and not own.all()
+    return found
 
 
 def contact_sources(contact: Codes, undeclared: npt.NDArray[np.bool_] | None = None) -> Codes:
