@@ -80,7 +80,7 @@ def rms_length(vectors: npt.NDArray[np.float64], axis: int | None = None) -> npt
 
 
 def _root_mean(squares: npt.NDArray[np.float64], axis: int | None) -> npt.NDArray[np.float64]:
-    known = np.isfinite(squares)
+    known = ~np.isnan(squares)  # an infinity is no gap
     with np.errstate(invalid="ignore"):
         return np.asarray(np.sqrt(np.where(known, squares, 0.0).sum(axis=axis) / known.sum(axis=axis)))
 

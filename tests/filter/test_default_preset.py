@@ -246,7 +246,9 @@ def test_a_joint_that_nobody_sees_is_held_and_comes_back(trial: SimulatedTrial) 
     without = with_markers(trial.recording, hidden)
     result = estimator(side="right").run(without, lag_s=0.0)
     elbow = result.data["coordinates"].sel(coordinate="elbow").values
-    sd = result.data["coordinates_sd"].sel(coordinate="elbow").values
+    sd = result.data["state_sd"].sel(element="elbow").values
+    known = np.isfinite(result.data["coordinates_sd"].sel(coordinate="elbow").values)
+    assert not known[400:700].any() and np.delete(known, np.arange(400, 700)).all()
     assert (sd[480:700] > 0.2).all() and sd[720] < 0.1
     assert any(event.subject == "elbow" and "held" in event.message for event in result.events)
     whole = estimator(side="right").run(trial.recording, lag_s=0.0).data["coordinates"].sel(coordinate="elbow").values
@@ -255,7 +257,7 @@ def test_a_joint_that_nobody_sees_is_held_and_comes_back(trial: SimulatedTrial) 
     assert (later < 3.0 * sd[750:]).all()
     smoothed = estimator(side="right").run(without, lag_s=np.inf).data
     assert np.isfinite(smoothed["state"].values).all()
-    assert (smoothed["coordinates_sd"].sel(coordinate="elbow").values[400:700] <= sd[400:700] + 1e-12).all()
+    assert (smoothed["state_sd"].sel(element="elbow").values[400:700] <= sd[400:700] + 1e-12).all()
 
 
 def test_every_output_has_a_deviation_in_the_files(smoothed: Estimate, tmp_path) -> None:

@@ -17,7 +17,7 @@ from dynakin.bindings import _core
 from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes
 from dynakin.filter.joint_errors import JointErrors
 from dynakin.filter.reported_sd import BLOCKS, OWN_AT_ONCE, OWN_LATE, SPEEDS_STILL, movement_intensity, reported
-from dynakin.filter.systematic import _STEP_S, COMMON, SKIN_ANGLE_RAD, Systematic, any_off_plates
+from dynakin.filter.systematic import _STEP_S, COMMON, ROOT_SKIN, SKIN_ANGLE_RAD, Systematic, any_off_plates
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
 from dynakin.settings.noise import Noise
 
@@ -188,6 +188,7 @@ def test_skin_that_follows_the_knee_is_that_of_displaced_markers() -> None:
             for c in coordinates:
                 own, common = rng.standard_normal((4, 3)), rng.standard_normal(3)
                 d[4 * k : 4 * k + 4] += s[c] * (np.sqrt(1.0 - COMMON) * own + np.sqrt(COMMON) * common)
+        d[:4] *= ROOT_SKIN
         d *= DECLARED[:, None] * weight
         draws.append(np.linalg.solve(J.T @ J + 4.0 * np.eye(10), J.T @ d.ravel()))
     parts = systematic().parts(Q, QD, QDD)["skin"]

@@ -14,7 +14,7 @@ from dynakin.filter.augment import variance_scales
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
 from dynakin.filter.labels import labels
-from dynakin.filter.noise import limit_sd, prior_factor
+from dynakin.filter.noise import prior_factor, unseen_limit
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
 from dynakin.filter.systematic import Systematic
@@ -62,9 +62,9 @@ def assemble(
         undeclared: (T,) frames in which something bears the person that no plate measures.
         systematic: what is added to the filter's deviations of angles, speeds, accelerations and moments.
     """
-    data = _dataset(arrays, model, initial, recording, measured, feet)
+    whole = _dataset(arrays, model, initial, recording, measured, feet)
     data = with_sources(
-        data,
+        whole,
         feet,
         np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared,
         initial.feet.values(),
@@ -104,7 +104,7 @@ def assemble(
             "reasons": list(config.get("ground_reasons", ())),
         },
     }
-    events = events_of(data, parameters, initial, limit_sd(used, used.unseen_sd))  # by what the filter itself believes
+    events = events_of(whole, parameters, initial, unseen_limit(used))  # by what the filter itself believes
     if systematic is not None:
         data = systematic.added_over_time(data, late=bool(config.get("lag_s")))
     estimate = Estimate(

@@ -10,7 +10,14 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError
 from dynakin.filter.augment import continuous_noise, extended, initial_covariance
-from dynakin.filter.noise import gate_limits, limit_sd, marker_variance, process_variance, wrench_covariance
+from dynakin.filter.noise import (
+    gate_limits,
+    limit_sd,
+    marker_variance,
+    process_variance,
+    unseen_limit,
+    wrench_covariance,
+)
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
@@ -53,7 +60,7 @@ def filter_settings(
             f"{', '.join(initial.recorded_markers)}"
         )
     point = noise.reference_point_m
-    unseen = limit_sd(noise, noise.unseen_sd)
+    unseen = unseen_limit(noise)
     found = {name: limit_sd(noise, sd) for name, sd in _FOUND_SD.items()}
     recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen, **found) if noise.recover else None
     density, decay = continuous_noise(initial, noise, layout)

@@ -94,10 +94,23 @@ def gate_limits(probability: float, scale: float = 1.0) -> list[float] | None:
     return [float(chdtri(rows, probability)) / min(scale, 1.0) for rows in range(1, 7)]
 
 
+LEAST_UNSEEN_SD = 0.25
+"""rad or m: 3 rad/s and m/s for a frame at 25 Hz, twice."""
+
+
 def limit_sd(noise: Noise, declared: float | None) -> float:
     """A limit on the deviation of a coordinate (rad or m) that goes by the declared variances, in those that the filter
     has; infinite where there is none."""
     return np.inf if declared is None else float(declared * np.sqrt(noise.variance_scale))
+
+
+def unseen_limit(noise: Noise) -> float:
+    """From which deviation of a coordinate on (rad or m) nobody sees it, and it is held: `Noise.unseen_sd` by
+    `limit_sd`, but not so little that the first step of a motion of unknown speed (`augment.BEGUN_SD`) comes near it.
+    """
+    if noise.unseen_sd is None:
+        return np.inf
+    return max(limit_sd(noise, noise.unseen_sd), min(noise.unseen_sd, LEAST_UNSEEN_SD))
 
 
 def prior_factor(noise: Noise) -> float:

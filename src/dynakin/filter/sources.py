@@ -13,12 +13,13 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NO_CONTACT
 from dynakin.results.estimate import values_of
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, Hidden, contact_sources
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, Hidden, contact_sources, out_of_sight
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Flags = npt.NDArray[np.bool_]
+Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
 
 
@@ -85,6 +86,15 @@ def with_sources(
         found[name] = data[name].where(xr.DataArray(known, dims=("time", "coordinate")))
     found["joint_loads"] = data["joint_loads"].where(xr.DataArray(carried, dims=("time", "joint")))
     return data.assign(found)  # all at once: each time takes 10 ms
+
+
+def unseen_coordinates(spec: _core.ModelSpec, markers: Array, time: Array) -> Flags:
+    """(T, C) coordinates of which nothing is seen that they move, for longer than `UNSEEN_S`: markers (T, M, 3)."""
+    segments = [segment.name for segment in spec.segments]
+    parents = np.array([_place(segments, segment.parent) for segment in spec.segments])
+    seen = np.asarray(np.isfinite(markers).any(axis=2))
+    hidden = out_of_sight(seen, [marker.segment for marker in spec.markers], time)
+    return _gone(hidden, segments, parents, len(time))[:, [segments.index(name) for name in moved_segments(spec)]]
 
 
 def _gone(hidden: Hidden, segments: list[str], parents: npt.NDArray[np.int_], frames: int) -> Flags:

@@ -192,9 +192,9 @@ class Recording:
         """Without the frames before the person is seen and after: those in which less than a quarter of the markers are
         that the others show. Nothing could be estimated there; that they are left out is a note."""
         seen = np.count_nonzero(np.isfinite(self.markers).all(axis=2), axis=1)
-        somebody = np.flatnonzero(seen >= np.maximum(_PERSON * np.median(seen[seen > 0]), 1.0)) if seen.any() else seen
-        if not len(somebody) or len(somebody) == self.n_frames:
+        if not seen.any():
             return self
+        somebody = np.flatnonzero(seen >= np.maximum(_PERSON * np.median(seen[seen > 0]), 1.0))
         keep = slice(int(somebody[0]), int(somebody[-1]) + 1)
         left_out = [
             f"the {'first' if where == 0 else 'last'} {count} frames"
@@ -204,7 +204,7 @@ class Recording:
         if not left_out:
             return self
         part = self._part(keep)
-        note = f"Nobody is seen in {' and '.join(left_out)}: they are left out."
+        note = f"Fewer than a quarter of the markers are seen in {' and '.join(left_out)}: they are left out."
         return replace(part, notes=(*self.notes, note.replace(" 1 frames", " frame")))
 
     def _part(self, keep: slice) -> Recording:

@@ -43,14 +43,14 @@ class Priors(Strict, use_attribute_docstrings=True):
     degrees."""
     translation_sd_m: Positive = 0.05
     """Joint translations (free-floating models), from the same landmarks."""
-    rotation_speed_sd_deg_s: Positive = 200.0
-    """Taken as 0 at the start, but most trials of walking start in motion: a knee that swings reaches 400 deg/s."""
-    translation_speed_sd_m_s: Positive = 2.0
+    rotation_speed_sd_deg_s: Positive = 60.0
+    """Taken as 0 at the start; a trial may start in motion, and a squat's joints reach 100 to 150 deg/s at
+    their fastest."""
+    translation_speed_sd_m_s: Positive = 0.5
     """The same for translations."""
-    rotation_acceleration_sd_deg_s2: Positive = 2500.0
-    """Taken as 0 at the start; hips and knees of a walk reach 2000 to 5000 deg/s². With 600, scaled by the noise as
-    well, the first 50 ms of a walk had hip moments 45 N m off, said to 8."""
-    translation_acceleration_sd_m_s2: Positive = 10.0
+    rotation_acceleration_sd_deg_s2: Positive = 600.0
+    """Taken as 0 at the start; a speed of 60 deg/s built up within 0.1 s."""
+    translation_acceleration_sd_m_s2: Positive = 5.0
     """The same for translations."""
     length_sd_fraction: Positive = 0.05
     """Lengths, of their value: joint centres are known to 1 or 2 cm, 3 to 5 % of a leg segment."""

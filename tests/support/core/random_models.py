@@ -195,7 +195,7 @@ def with_slow_errors(spec: Spec, seed: int, delay: bool = True) -> Spec:
         marker.soft_tissue = [bool(axis and rng.random() < 0.7) for axis in in_plane]
     spec.markers[0].soft_tissue = list(spec.markers[0].measured)
     spec.wrench_offset = [bool(seen and rng.random() < 0.8) for seen in spec.wrench_measured]
-    spec.wrench_offset_point = np.array([0.8, -0.1, -0.6])
+    spec.wrench_offset_point = np.array([-0.1, 0.05, 0.2])
     spec.wrench_delay = delay
     return spec
 

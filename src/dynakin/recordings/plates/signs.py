@@ -18,8 +18,8 @@ _SAMPLES = 5  # as few are a spike
 
 def pulling(pushes: Sequence[Array]) -> npt.NDArray[np.bool_]:
     """Which of the plates hold the person's action, by the forces (N,) N of each towards the person's side."""
-    known = [np.nan_to_num(push) for push in pushes]
-    largest = np.array([np.sort(np.abs(push))[-_SAMPLES:].min(initial=np.inf) for push in known])
+    known = [np.nan_to_num(push) if len(push) else np.zeros(1) for push in pushes]
+    largest = np.array([np.sort(np.abs(push))[-_SAMPLES:].min() for push in known])
     pulls = np.array(
         [np.median(push[np.abs(push) >= 0.5 * size]) < 0.0 for push, size in zip(known, largest, strict=True)],
         dtype=bool,

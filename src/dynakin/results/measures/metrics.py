@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.arrays import widened
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.adaptation import adaptation
@@ -179,10 +180,13 @@ def window_consistency(estimate: Estimate, window: np.ndarray) -> Consistency:
 
 
 def speed_consistency(estimate: Estimate, window: np.ndarray) -> tuple[dict[str, float], str]:
-    """How far each speed is from the derivative of its coordinate, and a sentence, empty where all fit."""
+    """How far each speed is from the derivative of its coordinate, and a sentence, empty where all fit. Frames in which
+    nothing is known of a speed do not count, nor do those next to them, whose derivative they are part of."""
     names = estimate.coordinate_names
-    values = (estimate.values(name)[window] for name in ("coordinates", "speeds"))
-    mismatch, moving = speed_mismatch(estimate.time[window], *values)
+    unknown = np.isnan(estimate.values("speeds_sd"))
+    beside = np.stack([widened(column, 1) for column in unknown.T], axis=1)
+    coordinates, speeds = (estimate.values(name)[window] for name in ("coordinates", "speeds"))
+    mismatch, moving = speed_mismatch(estimate.time[window], coordinates, np.where(beside[window], np.nan, speeds))
     finite = {name: float(value) for name, value in zip(names, mismatch, strict=True) if np.isfinite(value)}
     return finite, mismatch_in_words(names, estimate.is_rotation(), mismatch, moving)
 

@@ -74,7 +74,7 @@ def out_of_sight(seen: npt.NDArray[np.bool_], owners: Sequence[str], time: npt.N
         own = np.asarray(~seen[:, [name == segment for name in owners]].any(axis=1))
         found[segment] = np.zeros(len(time), dtype=bool)
         for first, end in runs(own):
-            found[segment][first:end] = time[end - 1] - time[first] > UNSEEN_S and not own.all()
+            found[segment][first:end] = time[end - 1] - time[first] > UNSEEN_S + 1e-9 and not own.all()
     return found
 
 

@@ -93,6 +93,7 @@ def prepare(
     Raises:
         DynakinError: as `Estimator.run`.
     """
+    recording = recording.without_empty_ends()
     initial = estimator.calibrate(recording, static=static)
     tracker = estimator.start(initial)
     markers, wrench = estimator.measured(recording, tracker.calibrated)
