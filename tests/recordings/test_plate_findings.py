@@ -98,6 +98,16 @@ def test_a_drift_beyond_what_is_judged_shows_no_place() -> None:
     assert any("while no foot is near it" in t for t in said) and not any("off its place" in t for t in said)
 
 
+def test_a_plate_that_reads_nothing_under_a_foot_is_dead() -> None:
+    made = walked().recording
+    nothing = {name: 0.0 * getattr(made.plates[1], name) for name in ("force", "moment", "free_moment")}
+    dead = replace(made.plates[1], **nothing, cop=np.full_like(made.plates[1].cop, np.nan))
+    said = messages(made.with_plates((made.plates[0], dead, *made.plates[2:])))
+    assert sum("reads nothing although the" in t for t in said) == 1
+    assert any(t.startswith(f"Warning: {dead.name} reads nothing") for t in said)
+    assert not any("reads nothing" in t for t in messages(made))
+
+
 def test_a_drift_below_the_noise_is_not_said() -> None:
     assert messages(walked(drift_n=8.0).recording) == []
 

@@ -1,4 +1,4 @@
-"""What is wrong with plates that only the feet show: one off its place, two exchanged, one that drifts.
+"""What is wrong with plates that only the feet show: one off its place, two exchanged, one that drifts, a dead one.
 
 Each is said in one sentence, with what to do. Nothing is put right here: a load that lies under no foot is left out.
 """
@@ -32,6 +32,9 @@ MOST_DRIFT_N = 2.0 * JUDGED_N
 """What a plate reads beside the load, at most: a press that stays below it may be nobody's, and shows no place."""
 CLEAR_S = 0.5
 """How long no foot must be near a plate for a drift to be said."""
+STANDS_S = 0.5
+"""How long a foot must stand on a plate that reads nothing for it to be said: one that hovers over it in a functional
+trial does for a quarter of a second."""
 CLEAR_M = 0.3
 """How far a foot must be from a plate to be surely not on it: its own length."""
 
@@ -59,6 +62,8 @@ def plate_findings(
         if not any(p in pair for pair in swapped) and (text := _off_place(plate, feet, contacts, soles, on, p)):
             said.append(text)
         if text := _drift(time, plate, soles, on[:, :, p]):
+            said.append(text)
+        if text := _dead(time, plate, feet, contacts, on):
             said.append(text)
     return said
 
@@ -162,6 +167,27 @@ def _drift(time: Array, plate: GroundPlate, soles: Soles, owners: Flags) -> str 
         f"Warning: {plate.name} reads {low:.0f} to {high:.0f} N while no foot is near it, between {time[clear][0]:.2f} "
         f"and {time[clear][-1]:.2f} s: zero it before the trial, or take it off with plate_loads."
     )
+
+
+def _dead(time: Array, plate: GroundPlate, feet: Sequence[str], contacts: Contacts, on: Flags) -> str | None:
+    """Whether a plate reads nothing although a foot stands wholly on it and no other plate carries that."""
+    if plate.corners is None or (plate.push > UNLOADED_N).any():
+        return None
+    for k, foot in enumerate(contacts):
+        if foot is None:
+            continue
+        for first, end in foot.stances:
+            own = slice(first, end)
+            if time[end - 1] - time[first] < STANDS_S or on[own, k].any():
+                continue
+            beyond = plate.beyond(foot.outline[own])
+            if np.isfinite(beyond).any() and np.nanmax(beyond) == 0.0:
+                return (
+                    f"Warning: {plate.name} reads nothing although the {feet[k]} foot stands on it from "
+                    f"{time[first]:.2f} to {time[end - 1]:.2f} s. Look whether its channels were connected, and leave "
+                    "it out of the file if not."
+                )
+    return None
 
 
 def _pressed_at(plate: GroundPlate) -> Array | None:
