@@ -14,8 +14,8 @@ Matrix6 carry(const Vector3& r) {
   return X;
 }
 
-// Covariance of a wrench declared at r, carried to the ground origin: force noise becomes moment
-// noise. An infinite variance there makes every component that depends on it infinite too; infinity times zero is zero.
+// Covariance of a wrench declared at r, carried to the ground origin: force noise becomes moment noise. An infinite
+// variance there makes every component that depends on it infinite too; infinity times zero is zero.
 Matrix6 carried(const Matrix6& R, const Vector3& r, std::array<bool, 6>& used) {
   const Matrix6 X = carry(r);
   Matrix6 finite = R;

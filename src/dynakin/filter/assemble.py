@@ -16,7 +16,7 @@ from dynakin.filter.events import events_of
 from dynakin.filter.labels import labels
 from dynakin.filter.noise import prior_factor, unseen_limit
 from dynakin.filter.parameters import parameters_of
-from dynakin.filter.sources import with_sources
+from dynakin.filter.sources import hidden_segments, with_sources
 from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
@@ -24,7 +24,7 @@ from dynakin.recordings.feet.contact import ON_PLATE, UNMEASURED
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import nearly_singular
-from dynakin.results.measures.sources import MEASURED, out_of_sight
+from dynakin.results.measures.sources import MEASURED
 from dynakin.results.records import Timing
 from dynakin.settings.noise import Noise
 
@@ -70,9 +70,7 @@ def assemble(
         initial.feet.values(),
         initial.held,
         initial.unmarked_feet.values(),
-        out_of_sight(
-            np.asarray(np.isfinite(measured[0]).any(axis=2)), [m.segment for m in initial.spec.markers], recording.time
-        ),
+        hidden_segments(initial.spec, measured[0], recording.time),
     )
     if feet is not None:
         _widen_priors(data, prior_factor(used), feet.blind)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.labels import labels
-from dynakin.filter.sources import ContactSources, unseen_coordinates
+from dynakin.filter.sources import ContactSources, hidden_segments
 from dynakin.filter.total_wrench import Ground
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -69,12 +69,14 @@ class Prepared:
         import xarray as xr  # the slowest library of all: what precedes the core does without
 
         calibrated = self.calibrated
-        sources = ContactSources.of(calibrated).moments(self.contacts)
+        known = ContactSources.of(calibrated)
+        sources = known.moments(self.contacts)
         if self.contacts is None:
             blind = np.isnan(self.wrench).all(axis=1)
             codes = np.where(self.ground.undeclared, ABSENT, np.where(blind, DERIVED, MEASURED))
             sources = np.maximum(sources, codes[:, None]).astype(np.uint8)
-        sources[unseen_coordinates(calibrated.spec, self.markers, self.recording.time)] = ABSENT
+        hidden = hidden_segments(calibrated.spec, self.markers, self.recording.time)
+        sources[known.unseen(hidden, len(sources))] = ABSENT
         data = xr.Dataset(coords=labels(self.tracker.core_model, calibrated, self.recording.time, self.contacts))
         if self.contacts is not None:
             data = data.isel(foot=[name != RESIDUAL for name in self.contacts.names])

@@ -88,13 +88,10 @@ def with_sources(
     return data.assign(found)  # all at once: each time takes 10 ms
 
 
-def unseen_coordinates(spec: _core.ModelSpec, markers: Array, time: Array) -> Flags:
-    """(T, C) coordinates of which nothing is seen that they move, for longer than `UNSEEN_S`: markers (T, M, 3)."""
-    segments = [segment.name for segment in spec.segments]
-    parents = np.array([_place(segments, segment.parent) for segment in spec.segments])
+def hidden_segments(spec: _core.ModelSpec, markers: Array, time: Array) -> Hidden:
+    """`out_of_sight` by a model's own markers (T, M, 3)."""
     seen = np.asarray(np.isfinite(markers).any(axis=2))
-    hidden = out_of_sight(seen, [marker.segment for marker in spec.markers], time)
-    return _gone(hidden, segments, parents, len(time))[:, [segments.index(name) for name in moved_segments(spec)]]
+    return out_of_sight(seen, [marker.segment for marker in spec.markers], time)
 
 
 def _gone(hidden: Hidden, segments: list[str], parents: npt.NDArray[np.int_], frames: int) -> Flags:
@@ -132,6 +129,10 @@ class ContactSources:
     def of(cls, initial: CalibratedModel) -> ContactSources:
         """Those of a calibrated model."""
         return cls(initial.spec, initial.feet.values(), initial.held, initial.unmarked_feet.values())
+
+    def unseen(self, hidden: Hidden, frames: int) -> Flags:
+        """(T, C) coordinates of which nothing is seen that they move, by their segments (`out_of_sight`)."""
+        return _gone(hidden, self._segments, self._parents, frames)[:, self._moved]
 
     def moments(self, feet: ContactLoads | None) -> Codes:
         """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody

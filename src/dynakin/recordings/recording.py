@@ -196,16 +196,13 @@ class Recording:
             return self
         somebody = np.flatnonzero(seen >= np.maximum(_PERSON * np.median(seen[seen > 0]), 1.0))
         keep = slice(int(somebody[0]), int(somebody[-1]) + 1)
-        left_out = [
-            f"the {'first' if where == 0 else 'last'} {count} frames"
-            for where, count in enumerate((keep.start, self.n_frames - keep.stop))
-            if count
-        ]
+        ends = (("first", keep.start), ("last", self.n_frames - keep.stop))
+        left_out = [f"the {end} {f'{count} frames' if count > 1 else 'frame'}" for end, count in ends if count]
         if not left_out:
             return self
         part = self._part(keep)
         note = f"Fewer than a quarter of the markers are seen in {' and '.join(left_out)}: they are left out."
-        return replace(part, notes=(*self.notes, note.replace(" 1 frames", " frame")))
+        return replace(part, notes=(*self.notes, note))
 
     def _part(self, keep: slice) -> Recording:
         """These frames; the times stay as they are."""

@@ -22,9 +22,9 @@ def marker_velocities(recording: Recording) -> Array:
     """Velocity of each marker (T, M, 3) m/s, laboratory frame, over 0.1 s around each frame, less where a gap is nearer
     than that or the recording ends; NaN where it is not seen, or for one frame only."""
     half = max(1, round(0.5 * _SPAN_S * recording.rate)) if recording.n_frames > 1 else 0
-    frames, last = np.arange(recording.n_frames)[:, None], recording.n_frames - 1
+    frames = np.arange(recording.n_frames)[:, None]
     first_seen, last_seen = _seen_without_break(np.asarray(np.isfinite(recording.markers).all(axis=2)))
-    before, after = np.maximum(frames - half, first_seen), np.minimum(np.minimum(frames + half, last), last_seen)
+    before, after = np.maximum(frames - half, first_seen), np.minimum(frames + half, last_seen)
     along = np.arange(recording.markers.shape[1])
     with np.errstate(invalid="ignore", divide="ignore"):
         travelled = recording.markers[after, along] - recording.markers[before, along]

@@ -321,9 +321,8 @@ def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[Marke
     if swap.share < _SHORT or (later and swap.share < _HALF):
         return match, f"Warning: {looks}: correct the labels; they are used as they are, and refused where they jump."
     one_place = len(swap.pairs) == 1 and len({place for place, _ in swap.keys}) == 1
-    if (
-        swap.span_s is None and one_place and swap.keys <= match.names.keys()
-    ):  # another exchange may have had one left out
+    here = swap.keys <= match.names.keys()  # another exchange may have had one left out
+    if swap.span_s is None and one_place and here:
         # right for left of one place: both are seen, and nothing else would put both where a body has them
         return match.exchanged(*swap.pairs[0]), f"Warning: {looks}; each is used as the other: correct the labels."
     left = match.without(swap.keys, f"{looks}: {CORRECT}")
