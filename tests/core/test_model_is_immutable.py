@@ -162,3 +162,25 @@ def test_a_filter_outlives_its_model():
     f.reset(data.x0, data.P0)
     del model
     np.testing.assert_array_equal(f.run(data.time, data.markers, data.wrench)["state"], expected)
+
+
+def test_a_specification_gives_copies_of_its_lists() -> None:
+    """A reference to an element would dangle as soon as another list is assigned: a process in twenty was aborted."""
+    spec = to_core(with_functions(spatial_model(5), 5))
+    for field in ("coordinates", "parameters", "segments", "markers"):
+        items = getattr(spec, field)
+        name = items[0].name
+        items[0].name = "another"
+        assert getattr(spec, field)[0].name == name
+        setattr(spec, field, items)
+        items[0].name = "a third"
+        assert getattr(spec, field)[0].name == "another"
+    segment = next(segment for segment in spec.segments if segment.lengths and segment.axes)
+    axis = next(axis for axis in segment.axes if axis.functions)
+    for owner, field, key, value in (
+        (segment, "axes", "scale", "another"),
+        (segment, "lengths", "parameter", "another"),
+        (axis, "functions", "kind", "polynomial" if axis.functions[0].kind != "polynomial" else "spline"),
+    ):
+        setattr(getattr(owner, field)[0], key, value)
+        assert getattr(getattr(owner, field)[0], key) != value

@@ -269,7 +269,9 @@ class MarkerSpec:
     def __setstate__(self, arg: tuple, /) -> None: ...
 
 class ModelSpec:
-    """A model as plain data; Model checks and compiles it."""
+    """
+    A model as plain data; Model checks and compiles it. Its lists are read as copies: assign them back.
+    """
 
     def __init__(self, name: str, coordinates: Sequence[CoordinateSpec], parameters: Sequence[ParameterSpec], segments: Sequence[SegmentSpec], markers: Sequence[MarkerSpec], gravity: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., wrench_measured: Sequence[bool] = [True, True, True, True, True, True], wrench_offset: Sequence[bool] = [False, False, False, False, False, False], wrench_offset_point: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., wrench_delay: bool = False, contacts: Sequence[str] = []) -> None: ...
 

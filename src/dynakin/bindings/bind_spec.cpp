@@ -10,6 +10,8 @@
 
 using namespace dynakin;
 
+// Lists of specs are read as copies, and assigned back where they were changed: a reference to an element would dangle
+// as soon as another list is assigned.
 namespace {
 
 // Pickling by the tuple of all fields.
@@ -96,7 +98,7 @@ void bind_axis(nb::module_& m) {
       .def_rw("direction", &AxisSpec::direction, nb::rv_policy::copy)
       .def_rw("coefficients", &AxisSpec::coefficients)
       .def_rw("scale", &AxisSpec::scale)
-      .def_rw("functions", &AxisSpec::functions);
+      .def_rw("functions", &AxisSpec::functions, nb::rv_policy::copy);
   axis.def("__getstate__", [](const AxisSpec& a) {
     return nb::make_tuple(a.coordinate, axis_kind_name(a.kind), a.direction, a.coefficients, a.scale, a.functions);
   });
@@ -131,8 +133,8 @@ void bind_spec(nb::module_& m) {
       .def_rw("parent", &SegmentSpec::parent)
       .def_rw("rotation", &SegmentSpec::rotation, nb::rv_policy::copy)
       .def_rw("translation", &SegmentSpec::translation, nb::rv_policy::copy)
-      .def_rw("lengths", &SegmentSpec::lengths)
-      .def_rw("axes", &SegmentSpec::axes)
+      .def_rw("lengths", &SegmentSpec::lengths, nb::rv_policy::copy)
+      .def_rw("axes", &SegmentSpec::axes, nb::rv_policy::copy)
       .def_rw("inertia", &SegmentSpec::inertia, nb::rv_policy::copy)
       .def_rw("inertia_estimated", &SegmentSpec::inertia_estimated);
   picklable(segment, &SegmentSpec::name, &SegmentSpec::parent, &SegmentSpec::rotation, &SegmentSpec::translation,
@@ -169,7 +171,9 @@ void bind_spec(nb::module_& m) {
             &MarkerSpec::estimated, &MarkerSpec::soft_tissue);
 
   using Flags6 = std::array<bool, 6>;
-  nb::class_<ModelSpec> model(m, "ModelSpec", "A model as plain data; Model checks and compiles it.");
+  nb::class_<ModelSpec> model(
+      m, "ModelSpec",
+      "A model as plain data; Model checks and compiles it. Its lists are read as copies: assign them back.");
   model
       .def(nb::init<std::string, std::vector<CoordinateSpec>, std::vector<ParameterSpec>, std::vector<SegmentSpec>,
                     std::vector<MarkerSpec>, Vector3, Flags6, Flags6, Vector3, bool, std::vector<std::string>>(),
@@ -179,10 +183,10 @@ void bind_spec(nb::module_& m) {
            nb::arg("wrench_offset_point") = Vector3(0.0, 0.0, 0.0), nb::arg("wrench_delay") = false,
            nb::arg("contacts") = std::vector<std::string>())
       .def_rw("name", &ModelSpec::name)
-      .def_rw("coordinates", &ModelSpec::coordinates)
-      .def_rw("parameters", &ModelSpec::parameters)
-      .def_rw("segments", &ModelSpec::segments)
-      .def_rw("markers", &ModelSpec::markers)
+      .def_rw("coordinates", &ModelSpec::coordinates, nb::rv_policy::copy)
+      .def_rw("parameters", &ModelSpec::parameters, nb::rv_policy::copy)
+      .def_rw("segments", &ModelSpec::segments, nb::rv_policy::copy)
+      .def_rw("markers", &ModelSpec::markers, nb::rv_policy::copy)
       .def_rw("gravity", &ModelSpec::gravity, nb::rv_policy::copy)
       .def_rw("wrench_measured", &ModelSpec::wrench_measured)
       .def_rw("wrench_offset", &ModelSpec::wrench_offset)
