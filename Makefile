@@ -15,7 +15,7 @@ export SKBUILD_BUILD_DIR := build/package
 # A file's tests stay in one process, so that what they share is made once.
 PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile
 
-.PHONY: all demo live check test test-python test-cpp test-cpp-install test-cpp-sanitize lint stubs bench peers nightly clean prerequisites
+.PHONY: all demo live check test test-python test-cpp test-cpp-install test-cpp-sanitize test-cpp-address test-cpp-thread lint stubs bench peers nightly clean prerequisites
 all: $(VENV)/.built
 
 prerequisites:
@@ -74,11 +74,15 @@ nightly: test-cpp-sanitize
 	$(PYTEST) -m nightly --dist load
 	+@$(MAKE) --no-print-directory peers
 
-# The core's own tests: as the package has it (nothing may be allocated in a step), and under the sanitizers.
+# The core's own tests: as the package has it (nothing may be allocated in a step), and under the sanitizers: of memory
+# and undefined behaviour, and of races between threads.
+test-cpp-sanitize: test-cpp-address test-cpp-thread
 test-cpp: BUILD = $(SKBUILD_BUILD_DIR)
-test-cpp-sanitize: BUILD = build/cpp-sanitize
-test-cpp test-cpp-sanitize: $(VENV)/.dev
-	@$(if $(findstring sanitize,$@),$(BIN)/cmake -S . -B $(BUILD) -G Ninja -DDYNAKIN_PYTHON=OFF -DDYNAKIN_SANITIZE=ON \
+test-cpp-address test-cpp-thread: BUILD = build/$(subst test-,,$@)
+test-cpp-address: SANITIZERS = address,undefined
+test-cpp-thread: SANITIZERS = thread
+test-cpp test-cpp-address test-cpp-thread: $(VENV)/.dev
+	@$(if $(SANITIZERS),$(BIN)/cmake -S . -B $(BUILD) -G Ninja -DDYNAKIN_PYTHON=OFF -DDYNAKIN_SANITIZE=$(SANITIZERS) \
 	  -DCMAKE_PREFIX_PATH="$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null)
 	@MAKEFLAGS= $(BIN)/cmake --build $(BUILD) --target core_tests >$(BUILD)/tests.log || { cat $(BUILD)/tests.log; exit 1; }
 	@$(BIN)/ctest --test-dir $(BUILD) --output-on-failure
