@@ -139,6 +139,15 @@ def test_a_prior_is_in_every_file_with_its_flag_and_in_no_figure_as_measured(bli
     assert "prior: load sharing assumed" in page and "A dotted arrow, and a moment with ≈?" in page
 
 
+def test_plates_that_carry_nobody_are_as_none_and_warned_of() -> None:
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    idle = [replace(p, force=0.0 * p.force, moment=0.0 * p.moment, cop=np.nan * p.cop) for p in walk.plates]
+    found, none = (ground_of(walk.with_plates(plates), person("fullbody")) for plates in (tuple(idle), ()))
+    assert found.loads is not None and none.loads is not None and not found.usable
+    np.testing.assert_array_equal(found.loads.reason, none.loads.reason)
+    assert found.notes[0].startswith("Warning: the plates carry nobody") and found.notes[1:] == none.notes
+
+
 def test_two_feet_on_one_plate_are_a_prior_and_their_sum_is_measured() -> None:
     squat = simulate("fullbody", "squat", 4, 6.0, 50.0).recording
     right, left = squat.plates
