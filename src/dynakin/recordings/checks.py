@@ -154,9 +154,9 @@ def _idle(recording: Recording, ground: GroundFrame, feet: Mapping[str, Array]) 
     if len(feet) > 1 and all(_beside(plate, ground, feet) for plate in recording.plates):
         return "Nobody steps on the plates: they carry nothing, and no foot is on any."
     return (
-        f"Warning: the plates carry nobody in this recording (they read {most:.1f} N at most): it is run as one without "
-        "plates, and the ground reaction follows from the motion. If somebody steps on them, look whether their "
-        "channels were connected and which unit they are in, or give the forces in N (--forces)."
+        f"Warning: the plates carry nobody in this recording (they read {most:.1f} N at most): it is run as one "
+        "without plates, and the ground reaction follows from the motion. If somebody steps on them, look whether "
+        "their channels were connected and which unit they are in, or give the forces in N (--forces)."
     )
 
 
