@@ -15,6 +15,7 @@ import pytest
 import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.filter.closure import closure
+from dynakin.filter.impossible import impossible
 from dynakin.filter.sources import with_sources
 from dynakin.filter.total_wrench import Ground
 from dynakin.recordings.feet.assignment import foot_loads
@@ -137,6 +138,40 @@ def test_a_prior_is_in_every_file_with_its_flag_and_in_no_figure_as_measured(bli
     assert "knee_angle_r" in rows and not any(name.endswith("/moment") and name.startswith("knee") for name in rows)
     page = (folder / "report.html").read_text()
     assert "prior: load sharing assumed" in page and "A dotted arrow, and a moment with ≈?" in page
+
+
+def test_a_walk_whose_file_has_a_wrong_rate_has_no_derived_forces() -> None:
+    """Everything then happens faster than it did: feet push with four times the weight, and pull."""
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    fast = replace(walk.with_plates(()), time=walk.time / 2.5)
+    found = person("fullbody").run(fast, lag_s=0.0)
+    derived = found.data["foot_contact"].transpose("time", "foot").values == UNMEASURED
+    assert (foot_sources(found.data)[derived] == ABSENT).all()
+    assert (sources(found, "knee_angle_r")[derived[:, 0]] == ABSENT).all()
+    assert np.isnan(found.data["moments"].sel(coordinate="knee_angle_r").values[derived[:, 0]]).all()
+    assert np.isnan(found.data["wrench_estimated"].values[derived.any(axis=1)]).all()
+    (said,) = [text for text in found.messages if "no ground's" in text]
+    reasons = compute_metrics(found)["moments"]["reasons"]
+    assert said.startswith("Warning: ") and any("no ground's" in text for text in reasons)
+
+
+@pytest.mark.parametrize(
+    ("push", "flies", "expected"), [(1.6, False, False), (4.0, False, True), (4.0, True, False), (6.5, True, True)]
+)
+def test_a_foot_takes_no_more_than_people_do_and_a_landing_more_than_a_walk(
+    push: float, flies: bool, expected: bool
+) -> None:
+    time, wrench = np.arange(200) / 100.0, np.zeros((200, 2, 6))
+    contact = np.full((200, 2), UNMEASURED, dtype=np.uint8)
+    wrench[:, :, 1], wrench[100, 0, 1] = 0.5 * WEIGHT, push * WEIGHT
+    contact[70:80] = NO_CONTACT if flies else UNMEASURED
+    feet: Any = SimpleNamespace(contact=contact, segments=("foot_r", "foot_l"))
+    found = impossible(feet, wrench, time, WEIGHT, ("foot_r", "foot_l"))
+    assert found.tolist() == [expected and 95 <= k <= 105 for k in range(200)]
+    wrench[100, 0, 1] = -0.4 * WEIGHT  # the ground pulls nobody
+    assert impossible(feet, wrench, time, WEIGHT, ("foot_r", "foot_l")).sum() == 11
+    contact[:, 0] = ON_PLATE  # a plate may measure what it measures
+    assert not impossible(feet, wrench, time, WEIGHT, ("foot_r", "foot_l")).any()
 
 
 def test_plates_that_carry_nobody_are_as_none_and_warned_of() -> None:

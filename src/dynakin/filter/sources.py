@@ -31,6 +31,7 @@ def with_sources(
     held: Collection[str] = (),
     unmarked: Collection[str] = (),
     hidden: Hidden | None = None,
+    impossible: Flags | None = None,
 ) -> xr.Dataset:
     """The dataset of an estimate with ``foot_source``, ``moment_source`` and ``joint_source``, and NaN where absent.
 
@@ -47,6 +48,7 @@ def with_sources(
         unmarked: those of ``soles`` that no marker shows: what they carry is absent, with all that lies before it.
         hidden: as of `out_of_sight`: while nothing of a segment is seen, nor of what hangs on it, its joint's moments
             are absent and nothing is known of its angles.
+        impossible: (T,) frames whose derived forces are none that the ground gives: these are absent.
     """
     import xarray as xr  # as in `assemble`
 
@@ -61,6 +63,11 @@ def with_sources(
         legs = np.zeros(len(segments), dtype=bool)
     else:
         contacts = _contacts(feet, undeclared, unmarked)
+        if impossible is not None:
+            contacts[impossible[:, None] & (contacts != MEASURED)] = ABSENT
+            blind = impossible & np.isnan(values_of(data, "wrench_measured")).all(axis=1)
+            believed = xr.DataArray(~blind, dims="time")
+            found |= {name: data[name].where(believed) for name in ("wrench_estimated", "wrench_sd") if name in data}
         there = xr.DataArray(contacts != ABSENT, dims=("time", "foot"))
         found["foot_source"] = (("time", "foot"), contacts)
         found |= {name: data[name].where(there) for name in ("foot_wrench", "foot_wrench_sd") if name in data}
