@@ -13,7 +13,15 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NO_CONTACT
 from dynakin.results.estimate import values_of
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, Hidden, contact_sources, out_of_sight
+from dynakin.results.measures.sources import (
+    ABSENT,
+    DERIVED,
+    MEASURED,
+    UNSEEN_S,
+    Hidden,
+    contact_sources,
+    out_of_sight,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,6 +107,26 @@ def hidden_segments(spec: _core.ModelSpec, markers: Array, time: Array) -> Hidde
     """`out_of_sight` by a model's own markers (T, M, 3)."""
     seen = np.asarray(np.isfinite(markers).any(axis=2))
     return out_of_sight(seen, [marker.segment for marker in spec.markers], time)
+
+
+class LiveSight:
+    """`out_of_sight`, frame by frame: what is hidden counts from `UNSEEN_S` on, because nobody knows before how long it
+    will be."""
+
+    def __init__(self, spec: _core.ModelSpec) -> None:
+        owners = [marker.segment for marker in spec.markers]
+        self._segments = list(dict.fromkeys(owners))
+        self._own = np.array([[owner == segment for owner in owners] for segment in self._segments], dtype=bool)
+        self._since = np.full(len(self._segments), np.nan)  # when it was lost; nan: it is seen, or never was
+        self._ever = np.zeros(len(self._segments), dtype=bool)
+
+    def look(self, time_s: float, markers: Array) -> Hidden:
+        """Segment -> (1,) whether it is out of sight at this time, by the markers (M, 3); empty where none is."""
+        seen = (self._own & np.isfinite(markers).any(axis=1)).any(axis=1)
+        self._ever |= seen
+        self._since = np.where(seen | ~self._ever, np.nan, np.fmin(self._since, time_s))
+        hidden = time_s - self._since > UNSEEN_S + 1e-9
+        return dict(zip(self._segments, hidden[:, None], strict=True)) if hidden.any() else {}
 
 
 def _gone(hidden: Hidden, segments: list[str], parents: npt.NDArray[np.int_], frames: int) -> Flags:
