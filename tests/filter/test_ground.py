@@ -433,6 +433,22 @@ def test_what_nobody_sees_for_longer_than_a_gap_is_absent() -> None:
     assert np.isfinite(found["coordinates_sd"].values[:, ~own]).all()
 
 
+def test_a_pelvis_that_nobody_sees_is_as_unsure_as_it_errs() -> None:
+    """Legs and trunk carry it, with their skin: its deviations took its own markers for seen."""
+    trial = simulate("fullbody", "gait", 3, 4.0, 50.0)
+    on_pelvis = ("ASIS", "PSIS", "HJC")
+    hidden = [k for k, name in enumerate(trial.recording.marker_names) if any(part in name for part in on_pelvis)]
+    markers, gap = trial.recording.markers.copy(), slice(90, 115)
+    markers[gap, hidden] = np.nan
+    found = person("fullbody").run(replace(trial.recording, markers=markers))
+    names = ["pelvis_tilt", "pelvis_list", "pelvis_rotation", "hip_flexion_r", "lumbar_extension"]
+    error = found.data["coordinates"].sel(coordinate=names) - trial.truth.data["coordinates"].sel(coordinate=names)
+    sd = found.data["coordinates_sd"].sel(coordinate=names).values
+    error = np.abs(error.values - np.median(error.values, axis=0))
+    assert (error[gap] < 2.0 * sd[gap]).mean() > 0.9 and (error[gap].max(axis=0) < 3.0 * sd[gap].max(axis=0)).all()
+    assert (sd[gap].mean(axis=0) > 1.3 * np.median(sd, axis=0)).all()
+
+
 def test_a_segment_that_never_has_a_marker_in_sight_is_no_gap() -> None:
     time = np.arange(100) / 100.0
     hidden = out_of_sight(np.zeros((100, 1), dtype=bool), ["shank_r"], time)

@@ -119,10 +119,15 @@ class LiveSight:
         self._own = np.array([[owner == segment for owner in owners] for segment in self._segments], dtype=bool)
         self._since = np.full(len(self._segments), np.nan)  # when it was lost; nan: it is seen, or never was
         self._ever = np.zeros(len(self._segments), dtype=bool)
+        self._seen_s = np.full(len(owners), -np.inf)
+        self.used = np.zeros(len(owners), dtype=bool)  # `in_use`
 
     def look(self, time_s: float, markers: Array) -> Hidden:
         """Segment -> (1,) whether it is out of sight at this time, by the markers (M, 3); empty where none is."""
-        seen = (self._own & np.isfinite(markers).any(axis=1)).any(axis=1)
+        now = np.isfinite(markers).any(axis=1)
+        self._seen_s[now] = time_s
+        self.used = time_s - self._seen_s <= UNSEEN_S + 1e-9
+        seen = (self._own & now).any(axis=1)
         self._ever |= seen
         self._since = np.where(seen | ~self._ever, np.nan, np.fmin(self._since, time_s))
         hidden = time_s - self._since > UNSEEN_S + 1e-9

@@ -34,7 +34,7 @@ Array = npt.NDArray[np.float64]
 
 class _Stepped(NamedTuple):
     """Of a step: its feet, whose moments are measured, their segments, whether plates miss one of them, or all; (C,)
-    coordinates of which nothing is seen."""
+    coordinates of which nothing is seen; (M,) markers that show the posture."""
 
     time_s: float
     loads: _core.ContactLoads | None
@@ -43,6 +43,7 @@ class _Stepped(NamedTuple):
     unmeasured: bool
     blind: bool
     unseen: npt.NDArray[np.bool_]
+    used: npt.NDArray[np.bool_]
 
 
 class Tracker:
@@ -168,7 +169,8 @@ class Tracker:
         blind = feet is not None and bool(feet.blind.any())
         self._off_plates |= feet is not None and stands_off_plates(feet.contact, len(self.calibrated.feet))
         segments = () if feet is None else feet.segments
-        self._stepped.append(_Stepped(sample.time_s, loads, sources, segments, unmeasured, blind, unseen))
+        used = self._sight.used
+        self._stepped.append(_Stepped(sample.time_s, loads, sources, segments, unmeasured, blind, unseen, used))
         self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, sources, loads)
         return self._latest
 
@@ -218,10 +220,11 @@ class Tracker:
             if loads is not None:
                 wrench = _core.contact_moments(self.core_model, state, loads)["foot_wrench"]
             segments = () if step is None else step.segments
-            sources = None if step is None else step.sources
+            sources, used = (None, None) if step is None else (step.sources, step.used)
             found |= self.systematic.added(
-                found, state, covariance, wrench, segments, sources=sources, off_plates=self._off_plates, late=late
-            )
+                found, state, covariance, wrench, segments,
+                sources=sources, off_plates=self._off_plates, late=late, used=used,
+            )  # fmt: skip
         if step is not None:
             found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])
             found |= {name: np.where(step.unseen, np.nan, found[name]) for name in BLOCKS[:3]}
