@@ -20,6 +20,7 @@ from dynakin.filter.sources import with_sources
 from dynakin.filter.total_wrench import Ground
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
+from dynakin.recordings.feet.loads import SWING
 from dynakin.recordings.feet.loads import UNKNOWN as FOOT_UNKNOWN
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.frame import GroundFrame
@@ -431,6 +432,21 @@ def test_what_nobody_sees_for_longer_than_a_gap_is_absent() -> None:
     np.testing.assert_array_equal(np.isnan(found["moments"].values[:, own]).all(axis=1), long)
     np.testing.assert_array_equal(np.isnan(found["coordinates_sd"].values[:, own]).all(axis=1), long)
     assert np.isfinite(found["coordinates_sd"].values[:, ~own]).all()
+
+
+@pytest.mark.parametrize("seen", [1, 2])
+def test_a_foot_that_is_seen_once_at_the_start_may_stand_there(seen: int) -> None:
+    """One frame has no speed, so that it seemed to swing: a moment that is measured as that of a foot in the air."""
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    whole = ground_of(walk, person("fullbody")).loads
+    assert whole is not None
+    stands = int(np.flatnonzero(whole.reason[0] != SWING)[0])
+    side = "r" if whole.feet[stands] == "right" else "L"
+    names = [f"{side}_{place}" for place in ("toe", "5meta", "calc", "ankle", "mankle")]
+    markers = walk.markers.copy()
+    markers[seen : seen + 6, [walk.marker_names.index(name) for name in names]] = np.nan
+    found = ground_of(replace(walk, markers=markers), person("fullbody")).loads
+    assert found is not None and (found.reason[: seen + 6, stands] != SWING).all()
 
 
 def test_a_pelvis_that_nobody_sees_is_as_unsure_as_it_errs() -> None:
