@@ -25,6 +25,7 @@ from dynakin.recordings.feet.loads import UNKNOWN as FOOT_UNKNOWN
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
+from dynakin.report.insights import insights
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, out_of_sight, wrench_sources
@@ -154,6 +155,8 @@ def test_a_walk_whose_file_has_a_wrong_rate_has_no_derived_forces() -> None:
     (said,) = [text for text in found.messages if "no ground's" in text]
     reasons = compute_metrics(found)["moments"]["reasons"]
     assert said.startswith("Warning: ") and any("no ground's" in text for text in reasons)
+    findings = {one.title: one for one in insights(found, compute_metrics(found)) if one.level == "warning"}
+    assert "no ground's" in findings["Recording"].text
 
 
 @pytest.mark.parametrize(

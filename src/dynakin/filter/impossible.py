@@ -49,12 +49,12 @@ def impossible(feet: ContactLoads, wrench: Array, time: Array, weight: float, so
 
 
 def impossible_in_words(frames: Flags, feet: ContactLoads, wrench: Array, time: Array, weight: float) -> str:
-    """A warning on these frames (T,), some of which there are."""
+    """A warning on these frames (T,), some of which there are; it names no plate, because none is to blame."""
     derived = frames[:, None] & ~np.isin(feet.contact, (NO_CONTACT, ON_PLATE))
     push = np.where(derived, wrench[..., 1], 0.0) / weight
     spans = listed([f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(frames)], 4)
     return (
-        f"Warning: the force that the motion asks of a foot off the plates is no ground's ({push.min():.1f} to "
+        f"Warning: where a foot's force follows from the motion it is no ground's ({push.min():.1f} to "
         f"{push.max():.1f} times the weight): from {spans} such forces, and the moments that rest on them, are absent. "
         "Look there for markers that jump, and check the recording's rate and the mass."
     )
