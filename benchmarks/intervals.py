@@ -48,7 +48,8 @@ WINDOW_S = {"squat": (2.0, 1e9), "walk": (0.3, 3.1)}
 FLEXION = ("pelvis_tilt", "hip_flexion", "knee_angle", "ankle_angle", "lumbar_extension")
 OTHER = ("pelvis_list", "pelvis_rotation", "hip_adduction", "hip_rotation", "subtalar_angle", "lumbar_bending",
          "lumbar_rotation")  # fmt: skip
-MOMENTS = ("hip_flexion", "knee_angle", "ankle_angle", "hip_adduction", "lumbar_extension")
+MOMENTS = ("hip_flexion", "knee_angle", "ankle_angle", "hip_adduction", "hip_rotation", "subtalar_angle",
+           "lumbar_extension", "lumbar_bending", "lumbar_rotation")  # fmt: skip
 HOLDS = (0.85, 0.99)
 RATIO = (0.5, 2.5)
 Array = np.ndarray

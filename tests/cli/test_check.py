@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from dynakin.cli.app import main
+from dynakin.cli.prepared import changed
 from dynakin.results.files.markers import write_trc
 from dynakin.results.files.storage import write_storage
 from dynakin.simulation.trial import simulate
+from support.made_recordings import standing
 
 Said = pytest.CaptureFixture[str]
 
@@ -135,3 +139,15 @@ def test_what_is_no_recording_or_no_option_is_wrong_input(tmp_path: Path, capsys
     there.write_text("no recording\n")
     assert [main(["check", str(tmp_path / "nowhere.trc")]), main(["check", str(there), "--mass", "-3"])] == [2, 2]
     assert main(["check", str(there)]) == 1
+
+
+def test_run_says_what_was_cut_or_turned_and_nothing_of_every_file() -> None:
+    made = standing()
+    markers = made.markers.copy()
+    markers[-3:] = np.nan
+    turned = "plate 1 stores the person's action, unlike the others: it is turned."
+    notes = ("Plates resampled from 10 samples a frame (zero-phase FIR low-pass).", "Warning: labels.", turned)
+    blank = replace(made, markers=markers, notes=notes).without_empty_ends()
+    said = changed(SimpleNamespace(recording=blank))  # type: ignore[arg-type]
+    assert [topic for topic, _ in said] == ["Note", "Note"]
+    assert said[0][1] == turned and "the last 3 frames: they are left out" in said[1][1]

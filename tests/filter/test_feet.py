@@ -95,6 +95,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
         recorded_markers=names,
         side="both",
         mass_kg=50.0,
+        weighed_kg=50.0,
         height_m=None,
         messages=(),
     )

@@ -15,14 +15,17 @@ import pytest
 import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.filter.closure import closure
+from dynakin.filter.impossible import impossible
 from dynakin.filter.sources import with_sources
 from dynakin.filter.total_wrench import Ground
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
+from dynakin.recordings.feet.loads import SWING
 from dynakin.recordings.feet.loads import UNKNOWN as FOOT_UNKNOWN
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
+from dynakin.report.insights import insights
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, out_of_sight, wrench_sources
@@ -137,6 +140,51 @@ def test_a_prior_is_in_every_file_with_its_flag_and_in_no_figure_as_measured(bli
     assert "knee_angle_r" in rows and not any(name.endswith("/moment") and name.startswith("knee") for name in rows)
     page = (folder / "report.html").read_text()
     assert "prior: load sharing assumed" in page and "A dotted arrow, and a moment with ≈?" in page
+
+
+def test_a_walk_whose_file_has_a_wrong_rate_has_no_derived_forces() -> None:
+    """Everything then happens faster than it did: feet push with four times the weight, and pull."""
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    fast = replace(walk.with_plates(()), time=walk.time / 2.5)
+    found = person("fullbody").run(fast, lag_s=0.0)
+    derived = found.data["foot_contact"].transpose("time", "foot").values == UNMEASURED
+    assert (foot_sources(found.data)[derived] == ABSENT).all()
+    assert (sources(found, "knee_angle_r")[derived[:, 0]] == ABSENT).all()
+    assert np.isnan(found.data["moments"].sel(coordinate="knee_angle_r").values[derived[:, 0]]).all()
+    assert np.isnan(found.data["wrench_estimated"].values[derived.any(axis=1)]).all()
+    (said,) = [text for text in found.messages if "no ground's" in text]
+    reasons = compute_metrics(found)["moments"]["reasons"]
+    assert said.startswith("Warning: ") and any("no ground's" in text for text in reasons)
+    findings = {one.title: one for one in insights(found, compute_metrics(found)) if one.level == "warning"}
+    assert "no ground's" in findings["Recording"].text
+
+
+@pytest.mark.parametrize(
+    ("push", "flies", "expected"), [(1.6, False, False), (4.0, False, True), (4.0, True, False), (6.5, True, True)]
+)
+def test_a_foot_takes_no_more_than_people_do_and_a_landing_more_than_a_walk(
+    push: float, flies: bool, expected: bool
+) -> None:
+    time, wrench = np.arange(200) / 100.0, np.zeros((200, 2, 6))
+    contact = np.full((200, 2), UNMEASURED, dtype=np.uint8)
+    wrench[:, :, 1], wrench[100, 0, 1] = 0.5 * WEIGHT, push * WEIGHT
+    contact[70:80] = NO_CONTACT if flies else UNMEASURED
+    feet: Any = SimpleNamespace(contact=contact, segments=("foot_r", "foot_l"))
+    found = impossible(feet, wrench, time, WEIGHT, ("foot_r", "foot_l"))
+    assert found.tolist() == [expected and 95 <= k <= 105 for k in range(200)]
+    wrench[100, 0, 1] = -0.4 * WEIGHT  # the ground pulls nobody
+    assert impossible(feet, wrench, time, WEIGHT, ("foot_r", "foot_l")).sum() == 11
+    contact[:, 0] = ON_PLATE  # a plate may measure what it measures
+    assert not impossible(feet, wrench, time, WEIGHT, ("foot_r", "foot_l")).any()
+
+
+def test_plates_that_carry_nobody_are_as_none_and_warned_of() -> None:
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    idle = [replace(p, force=0.0 * p.force, moment=0.0 * p.moment, cop=np.nan * p.cop) for p in walk.plates]
+    found, none = (ground_of(walk.with_plates(plates), person("fullbody")) for plates in (tuple(idle), ()))
+    assert found.loads is not None and none.loads is not None and not found.usable
+    np.testing.assert_array_equal(found.loads.reason, none.loads.reason)
+    assert found.notes[0].startswith("Warning: the plates carry nobody") and found.notes[1:] == none.notes
 
 
 def test_two_feet_on_one_plate_are_a_prior_and_their_sum_is_measured() -> None:
@@ -387,6 +435,37 @@ def test_what_nobody_sees_for_longer_than_a_gap_is_absent() -> None:
     np.testing.assert_array_equal(np.isnan(found["moments"].values[:, own]).all(axis=1), long)
     np.testing.assert_array_equal(np.isnan(found["coordinates_sd"].values[:, own]).all(axis=1), long)
     assert np.isfinite(found["coordinates_sd"].values[:, ~own]).all()
+
+
+@pytest.mark.parametrize("seen", [1, 2])
+def test_a_foot_that_is_seen_once_at_the_start_may_stand_there(seen: int) -> None:
+    """One frame has no speed, so that it seemed to swing: a moment that is measured as that of a foot in the air."""
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    whole = ground_of(walk, person("fullbody")).loads
+    assert whole is not None
+    stands = int(np.flatnonzero(whole.reason[0] != SWING)[0])
+    side = "r" if whole.feet[stands] == "right" else "L"
+    names = [f"{side}_{place}" for place in ("toe", "5meta", "calc", "ankle", "mankle")]
+    markers = walk.markers.copy()
+    markers[seen : seen + 6, [walk.marker_names.index(name) for name in names]] = np.nan
+    found = ground_of(replace(walk, markers=markers), person("fullbody")).loads
+    assert found is not None and (found.reason[: seen + 6, stands] != SWING).all()
+
+
+def test_a_pelvis_that_nobody_sees_is_as_unsure_as_it_errs() -> None:
+    """Legs and trunk carry it, with their skin: its deviations took its own markers for seen."""
+    trial = simulate("fullbody", "gait", 3, 4.0, 50.0)
+    on_pelvis = ("ASIS", "PSIS", "HJC")
+    hidden = [k for k, name in enumerate(trial.recording.marker_names) if any(part in name for part in on_pelvis)]
+    markers, gap = trial.recording.markers.copy(), slice(90, 115)
+    markers[gap, hidden] = np.nan
+    found = person("fullbody").run(replace(trial.recording, markers=markers))
+    names = ["pelvis_tilt", "pelvis_list", "pelvis_rotation", "hip_flexion_r", "lumbar_extension"]
+    error = found.data["coordinates"].sel(coordinate=names) - trial.truth.data["coordinates"].sel(coordinate=names)
+    sd = found.data["coordinates_sd"].sel(coordinate=names).values
+    error = np.abs(error.values - np.median(error.values, axis=0))
+    assert (error[gap] < 2.0 * sd[gap]).mean() > 0.9 and (error[gap].max(axis=0) < 3.0 * sd[gap].max(axis=0)).all()
+    assert (sd[gap].mean(axis=0) > 1.3 * np.median(sd, axis=0)).all()
 
 
 def test_a_segment_that_never_has_a_marker_in_sight_is_no_gap() -> None:

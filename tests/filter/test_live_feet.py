@@ -17,6 +17,7 @@ from dynakin.filter.tracker import Tracker
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.recording import Recording
+from dynakin.results.measures.sources import ABSENT
 from dynakin.settings import presets
 from dynakin.simulation.trial import simulate
 
@@ -61,6 +62,28 @@ def test_a_session_counts_measured_moments_more_once_a_foot_has_stood_off_the_pl
         np.testing.assert_array_equal(after[False], before[False])
         knee = [coordinate.name for coordinate in live.calibrated.spec.coordinates].index("knee_angle_l")
         assert (after[True][knee] > before[True][knee]) == off_plates
+
+
+def test_a_limb_that_nobody_sees_is_absent_from_the_fifth_of_a_second_on() -> None:
+    recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.4)
+    live = Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))).start(recording)
+    on_foot = {
+        name
+        for name, marker in zip(live.calibrated.recorded_markers, live.calibrated.spec.markers, strict=True)
+        if marker.segment == "foot_r"
+    }
+    said = []
+    for k, sample in enumerate(_samples(recording)):
+        seen = {name: at for name, at in sample.markers.items() if name not in on_foot or not 5 <= k < 35}
+        found = live.step(replace(sample, markers=seen))
+        said.append(found.moment_sources["ankle_angle_r"] == ABSENT)
+        assert bool(np.isnan(found.moments["ankle_angle_r"])) == said[-1]
+        assert found.moment_sources["ankle_angle_l"] != ABSENT
+        sd = live.deviations()
+        for block in ("coordinates", "speeds", "accelerations", "moments"):
+            assert bool(np.isnan(sd[block]["ankle_angle_r"])) == said[-1]
+            assert np.isfinite(sd[block]["knee_angle_r"])
+    assert np.flatnonzero(said).tolist() == list(range(26, 35))  # 0.21 s after frame 5
 
 
 def _feet(recording: Recording, live: Tracker) -> ContactLoads:

@@ -18,7 +18,7 @@ from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes
 from dynakin.filter.joint_errors import JointErrors
 from dynakin.filter.reported_sd import BLOCKS, OWN_AT_ONCE, OWN_LATE, SPEEDS_STILL, movement_intensity, reported
 from dynakin.filter.systematic import _STEP_S, COMMON, ROOT_SKIN, SKIN_ANGLE_RAD, Systematic, any_off_plates
-from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
+from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
 from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
@@ -193,6 +193,26 @@ def test_skin_that_follows_the_knee_is_that_of_displaced_markers() -> None:
         draws.append(np.linalg.solve(J.T @ J + 4.0 * np.eye(10), J.T @ d.ravel()))
     parts = systematic().parts(Q, QD, QDD)["skin"]
     np.testing.assert_allclose(np.sqrt(parts["coordinates"]), np.std(draws, axis=0), rtol=0.06)
+
+
+def test_markers_that_nobody_sees_show_nothing() -> None:
+    """Two markers of four on the segment that floats: what the skin of the others does counts for more."""
+    unsure, used = systematic(), np.ones(12, dtype=bool)
+    seen = unsure.parts(Q, QD, QDD, used=used)
+    np.testing.assert_array_equal(seen["skin"]["moments"], unsure.parts(Q, QD, QDD)["skin"]["moments"])
+    used[:2] = False
+    gone = unsure.parts(Q, QD, QDD, used=used)
+    assert gone["skin"]["coordinates"][:6].sum() > 1.5 * seen["skin"]["coordinates"][:6].sum()
+    gain, _ = unsure._gain(unsure._errors.state(Q, QD, QDD), used)
+    assert not gain[:, np.repeat(~used, 3)].any() and np.isfinite(gain).all()
+
+
+def test_a_marker_shows_the_posture_until_a_fifth_of_a_second_after_it_was_seen() -> None:
+    time, seen = np.arange(100) / 100.0, np.ones((100, 3), dtype=bool)
+    seen[20:35, 0] = seen[50:90, 0] = seen[:, 1] = False
+    used = in_use(seen, time)
+    assert used[:50, 0].all() and not used[50:90, 0].any() and used[90:, 0].all()
+    assert not used[:, 1].any() and used[:, 2].all()
 
 
 def test_speeds_of_skin_are_the_rates_of_its_angles() -> None:
@@ -399,6 +419,7 @@ def test_over_time_inertia_is_known_as_well_as_in_each_frame() -> None:
             "state_sd": (("time", "element"), sd),  # constants' by the declared noise
             "final_covariance": (("element", "element_"), last),
             "foot_wrench": (("time", "foot", "component"), np.tile(CONTACT, (4, 1, 1))),
+            "markers_measured": (("time", "marker", "axis"), np.zeros((4, 12, 3))),
         },
         coords={"time": time, "foot_segment": ("foot", ["shank"])},
     )

@@ -60,6 +60,17 @@ def test_bounds_are_counted_by_kind_and_those_touched_for_a_time_are_told(estima
     assert "1 other touched a bound and left it (longest: shank length, 50 % of the time)" in finding
 
 
+def test_a_bound_that_lies_nearer_than_a_number_is_known_says_nothing(estimate: Estimate) -> None:
+    """As the axial inertia of a thigh in a walk, which wanders to its bound by chance."""
+    vague = [replace(p, sd=2.0 * abs(p.value - p.initial)) if p.at_bound else p for p in estimate.parameters]
+    finding = found(replace(estimate, parameters=vague))["Bounds"]
+    assert finding.level == "good" and "that the recording knows ends on its bound" in finding.text
+    assert "hardly knows thigh length and pelvis mass: that they end on a bound says nothing" in finding.text
+    one = [v if v.kind == "inertia" else p for v, p in zip(vague, estimate.parameters, strict=True)]
+    finding = found(replace(estimate, parameters=one))["Bounds"]
+    assert finding.level == "warning" and "1 of 47 estimated parameters end on a bound: thigh length." in finding.text
+
+
 def test_what_was_warned_of_is_a_finding_by_its_subject(estimate: Estimate) -> None:
     warned = replace(
         estimate,

@@ -29,6 +29,17 @@ MARKERS, SIDES, GROUND, SUBJECT = ("Marker set",), ("Limb markers",), ("Vertical
     "Sex",
 )  # fmt: skip
 """How the sentences of a calibration on these begin."""
+_ROUTINE = (
+    "Time 0 is ",
+    "Plates resampled from ",
+    "Missing for part of the recording",
+    " points left out",
+    " no marker and left out",
+    " no markers and left out",
+    " marker frames (",
+    "The file has no force plates",
+)
+"""Words of what is done to every file of a kind, or that the figures of a run have: not said before it."""
 _LONGEST_LIST, _KEPT = 8, 5
 _MOST_SPANS = 6
 _TOPIC = 11  # characters of the longest topic
@@ -58,6 +69,12 @@ def assumed(ready: Prepared, settings: Settings) -> Rows:
     ahead = ", ".join(f"{value:.2f}" for value in calibrated.ground.forward + 0.0)
     rows += [("Ground", f"{calibrated.ground.vertical} is up; the person faces ({ahead}); {_sides(ready)}.")]
     return [*rows, ("Plates", _plates(ready))]
+
+
+def changed(ready: Prepared) -> Rows:
+    """What was turned, left out or cut in the recording, a line each; warnings stand at the end of a run."""
+    notes = [text for text in ready.recording.notes if not text.startswith(WARNING)]
+    return [("Note", short(text)) for text in notes if not any(words in text for words in _ROUTINE)]
 
 
 def naming_static(refusal: DynakinError, case: Case) -> DynakinError:

@@ -42,7 +42,7 @@ def run(
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
     with stage("loading"):  # the libraries alone take seconds on a busy machine
-        from dynakin.cli.prepared import assumed, naming_static, print_rows
+        from dynakin.cli.prepared import assumed, changed, naming_static, print_rows
         from dynakin.pipeline.stages import configure, prepare_case, run_case
         from dynakin.results.files.folder import check_folder_writable, check_output_writable
         from dynakin.validation.case import case_of
@@ -65,7 +65,8 @@ def run(
             ready = prepare_case(case)
         except DynakinError as refusal:
             raise naming_static(refusal, case) from None
-    print_rows(out(), assumed(next(iter(ready.values())), config))
+    first = next(iter(ready.values()))
+    print_rows(out(), [*assumed(first, config), *changed(first)])
     result = run_case(case, ready=ready, keep_lost=keep_lost, keep="--keep-lost")
     folder = result.save(config.output, keep_lost=keep_lost, check=False)
     from dynakin.cli.summary import end, print_summary  # loaded while the core works, for the most part

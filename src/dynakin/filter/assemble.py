@@ -13,6 +13,7 @@ from dynakin.bindings import _core
 from dynakin.filter.augment import variance_scales
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
+from dynakin.filter.impossible import impossible, impossible_in_words
 from dynakin.filter.labels import labels
 from dynakin.filter.noise import prior_factor, unseen_limit
 from dynakin.filter.parameters import parameters_of
@@ -25,8 +26,9 @@ from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import nearly_singular
 from dynakin.results.measures.sources import MEASURED
-from dynakin.results.records import Timing
+from dynakin.results.records import NO_ESTIMATE, TRACKING, Timing
 from dynakin.settings.noise import Noise
+from dynakin.units import GRAVITY_M_S2
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,6 +65,14 @@ def assemble(
         systematic: what is added to the filter's deviations of angles, speeds, accelerations and moments.
     """
     whole = _dataset(arrays, model, initial, recording, measured, feet)
+    beyond, reasons = None, list(config.get("ground_reasons", ()))
+    if feet is not None:
+        weight, forces = initial.weighed_kg * GRAVITY_M_S2, arrays["foot_wrench"]
+        beyond = impossible(feet, forces, recording.time, weight, initial.feet.values())
+        beyond &= ~np.isin(arrays["tracking"], [TRACKING.index(word) for word in NO_ESTIMATE])
+        if beyond.any():
+            reasons.append(impossible_in_words(beyond, feet, forces, recording.time, weight))
+            notes = [*notes, reasons[-1]]
     data = with_sources(
         whole,
         feet,
@@ -71,6 +81,7 @@ def assemble(
         initial.held,
         initial.unmarked_feet.values(),
         hidden_segments(initial.spec, measured[0], recording.time),
+        beyond,
     )
     if feet is not None:
         _widen_priors(data, prior_factor(used), feet.blind)
@@ -99,7 +110,7 @@ def assemble(
             "vertical": initial.ground.vertical,
             "forward": initial.ground.forward.tolist(),
             "origin_m": initial.ground.origin_L.tolist(),
-            "reasons": list(config.get("ground_reasons", ())),
+            "reasons": reasons,
         },
     }
     events = events_of(whole, parameters, initial, unseen_limit(used))  # by what the filter itself believes

@@ -13,7 +13,15 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NO_CONTACT
 from dynakin.results.estimate import values_of
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, Hidden, contact_sources, out_of_sight
+from dynakin.results.measures.sources import (
+    ABSENT,
+    DERIVED,
+    MEASURED,
+    UNSEEN_S,
+    Hidden,
+    contact_sources,
+    out_of_sight,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,6 +39,7 @@ def with_sources(
     held: Collection[str] = (),
     unmarked: Collection[str] = (),
     hidden: Hidden | None = None,
+    impossible: Flags | None = None,
 ) -> xr.Dataset:
     """The dataset of an estimate with ``foot_source``, ``moment_source`` and ``joint_source``, and NaN where absent.
 
@@ -47,6 +56,7 @@ def with_sources(
         unmarked: those of ``soles`` that no marker shows: what they carry is absent, with all that lies before it.
         hidden: as of `out_of_sight`: while nothing of a segment is seen, nor of what hangs on it, its joint's moments
             are absent and nothing is known of its angles.
+        impossible: (T,) frames whose derived forces are none that the ground gives: these are absent.
     """
     import xarray as xr  # as in `assemble`
 
@@ -61,6 +71,11 @@ def with_sources(
         legs = np.zeros(len(segments), dtype=bool)
     else:
         contacts = _contacts(feet, undeclared, unmarked)
+        if impossible is not None:
+            contacts[impossible[:, None] & (contacts != MEASURED)] = ABSENT
+            blind = impossible & np.isnan(values_of(data, "wrench_measured")).all(axis=1)
+            believed = xr.DataArray(~blind, dims="time")
+            found |= {name: data[name].where(believed) for name in ("wrench_estimated", "wrench_sd") if name in data}
         there = xr.DataArray(contacts != ABSENT, dims=("time", "foot"))
         found["foot_source"] = (("time", "foot"), contacts)
         found |= {name: data[name].where(there) for name in ("foot_wrench", "foot_wrench_sd") if name in data}
@@ -92,6 +107,31 @@ def hidden_segments(spec: _core.ModelSpec, markers: Array, time: Array) -> Hidde
     """`out_of_sight` by a model's own markers (T, M, 3)."""
     seen = np.asarray(np.isfinite(markers).any(axis=2))
     return out_of_sight(seen, [marker.segment for marker in spec.markers], time)
+
+
+class LiveSight:
+    """`out_of_sight`, frame by frame: what is hidden counts from `UNSEEN_S` on, because nobody knows before how long it
+    will be."""
+
+    def __init__(self, spec: _core.ModelSpec) -> None:
+        owners = [marker.segment for marker in spec.markers]
+        self._segments = list(dict.fromkeys(owners))
+        self._own = np.array([[owner == segment for owner in owners] for segment in self._segments], dtype=bool)
+        self._since = np.full(len(self._segments), np.nan)  # when it was lost; nan: it is seen, or never was
+        self._ever = np.zeros(len(self._segments), dtype=bool)
+        self._seen_s = np.full(len(owners), -np.inf)
+        self.used = np.zeros(len(owners), dtype=bool)  # `in_use`
+
+    def look(self, time_s: float, markers: Array) -> Hidden:
+        """Segment -> (1,) whether it is out of sight at this time, by the markers (M, 3); empty where none is."""
+        now = np.isfinite(markers).any(axis=1)
+        self._seen_s[now] = time_s
+        self.used = time_s - self._seen_s <= UNSEEN_S + 1e-9
+        seen = (self._own & now).any(axis=1)
+        self._ever |= seen
+        self._since = np.where(seen | ~self._ever, np.nan, np.fmin(self._since, time_s))
+        hidden = time_s - self._since > UNSEEN_S + 1e-9
+        return dict(zip(self._segments, hidden[:, None], strict=True)) if hidden.any() else {}
 
 
 def _gone(hidden: Hidden, segments: list[str], parents: npt.NDArray[np.int_], frames: int) -> Flags:

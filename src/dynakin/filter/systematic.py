@@ -23,7 +23,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.estimate import values_of
-from dynakin.results.measures.sources import moment_sources
+from dynakin.results.measures.sources import in_use, moment_sources
 from dynakin.results.records import MISPLACED
 from dynakin.settings.noise import Noise
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 MISFIT = 1.6
 """Times `Sizes.placed` from which a run says that a model was not scaled well: by truth 0.6 to 1.1 with the person's
@@ -101,30 +102,32 @@ class Systematic:
         """(3 M, S): what each source does to the markers of the model as it is posed."""
         return np.asarray(jacobian[:, self._errors.placed] @ self._errors.sources)
 
-    def _gain(self, x: Array) -> tuple[Array, Array]:
-        """Minus the least squares gain (K, 3 M) of the markers, and the net displacements N (3 M, S) of the geometry:
-        markers sit where the reference posture showed them, regardless of what is wrong with the joints."""
+    def _gain(self, x: Array, used: Flags | None = None) -> tuple[Array, Array]:
+        """Minus the least squares gain (K, 3 M) of the markers ``used`` (M,), all where not given, and the net
+        displacements N (3 M, S) of the geometry: markers sit where the reference posture showed them, regardless of
+        what is wrong with the joints."""
         jacobian = _core.marker_jacobian(self._errors.model, x)
         turned = (_core.segment_poses(self._errors.model, x)[0] @ self._R0.swapaxes(-1, -2))[self._segment]
         carried = turned @ self._D0.reshape(len(self._segment), 3, -1)
         N = self._displacements(jacobian) - carried.reshape(self._D0.shape)
-        A = jacobian[:, self._errors.free] * self._root_weight[:, None]
+        weight = self._root_weight if used is None else np.where(np.repeat(used, 3), self._root_weight, 0.0)
+        A = jacobian[:, self._errors.free] * weight[:, None]
         normal = A.T @ A
         normal[np.diag_indices_from(normal)] += _UNSEEN_SD**-2
-        return -cho_solve(cho_factor(normal), (A * self._root_weight[:, None]).T), N
+        return -cho_solve(cho_factor(normal), (A * weight[:, None]).T), N
 
-    def parts(self, q: Array, qd: Array, qdd: Array, external: Array | None = None) -> Parts:
+    def parts(self, q: Array, qd: Array, qdd: Array, external: Array | None = None, used: Flags | None = None) -> Parts:
         """Variances by kind of error, of errors of size 1 (m, rad, declared size): block -> (C,).
 
         Args:
             q, qd, qdd: (K,) of the free coordinates. external: (S, 6) wrenches on the segments, about the ground's
-                origin.
+                origin. used: (M,) markers that show the posture (`in_use`); not given: all.
         """
         errors = self._errors
         gains, effects = [], []
         for h in (-_STEP_S, 0.0, _STEP_S):
             x = errors.state(q + h * qd + 0.5 * h * h * qdd, qd, qdd)
-            gain, N = self._gain(x)
+            gain, N = self._gain(x, used)
             gains.append(gain)
             effects.append(gain @ N)
         G, Gd, Gdd = _differences(gains)
@@ -201,13 +204,14 @@ class Systematic:
             wrench = np.nan_to_num(values_of(data, "foot_wrench"))
             segments = [str(name) for name in data["foot_segment"].values]
         chosen = _sampled(time)
-        each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments) for k in chosen]
+        used = in_use(np.isfinite(values_of(data, "markers_measured")).any(axis=2), time)
+        each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments, used[k]) for k in chosen]
         return {
             kind: {block: _between(time, time[chosen], np.array([p[kind][block] for p in each])) for block in BLOCKS}
             for kind in (*KINDS, "inertia")
         }
 
-    def _at(self, x: Array, inertia: Array, wrench: Array, segments: Sequence[str]) -> Parts:
+    def _at(self, x: Array, inertia: Array, wrench: Array, segments: Sequence[str], used: Flags | None = None) -> Parts:
         """`parts` of a state (n,), and "inertia" of this covariance (I, I), with wrenches (F, 6) of contacts on these
         segments."""
         K = len(self._free)
@@ -218,7 +222,7 @@ class Systematic:
             external[self._segments[name]] += values
         still = np.zeros(K)
         by_inertia = self._labelled(still, still, still, self._by_inertia(x, inertia, external))
-        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external) | {"inertia": by_inertia}
+        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external, used) | {"inertia": by_inertia}
 
     def added(
         self,
@@ -231,18 +235,19 @@ class Systematic:
         sources: npt.NDArray[np.uint8] | None = None,
         off_plates: bool = False,
         late: bool,
+        used: Flags | None = None,
     ) -> dict[str, Array]:
         """The filter's standard deviations of one frame (block -> (C,)) with these errors.
 
         Args:
             x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. sources, off_plates,
-                late: as of `reported`.
+                late: as of `reported`. used: as of `parts`.
         """
         inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
         own = {block: found[block] for block in BLOCKS}
         K = len(self._free)
         intense = movement_intensity(x[2 * K : 3 * K], own["accelerations"][self._free])
-        parts = self._at(x, inertia, wrench, segments)
+        parts = self._at(x, inertia, wrench, segments, used)
         moved = self.moved_m(x)
         return reported(
             self.sizes, self._variance_scale, own, parts, intense, moved, sources, off_plates=off_plates, late=late

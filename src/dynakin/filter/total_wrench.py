@@ -117,6 +117,9 @@ def known_ground(
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads)
     if check.refusal:
         raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+    if check.unused:
+        ground, nothing = known_ground(recording.with_plates(()), initial, markers, np.full_like(wrench, np.nan))
+        return replace(ground, notes=(*check.messages, *ground.notes)), nothing
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
         if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):

@@ -15,8 +15,9 @@ from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.noise import prior_factor
+from dynakin.filter.reported_sd import BLOCKS
 from dynakin.filter.samples import Sample, sample_arrays
-from dynakin.filter.sources import ContactSources
+from dynakin.filter.sources import ContactSources, LiveSight
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.filter.systematic import Systematic, stands_off_plates
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -32,7 +33,8 @@ Array = npt.NDArray[np.float64]
 
 
 class _Stepped(NamedTuple):
-    """Of a step: its feet, whose moments are measured, their segments, whether plates miss one of them, or all."""
+    """Of a step: its feet, whose moments are measured, their segments, whether plates miss one of them, or all; (C,)
+    coordinates of which nothing is seen; (M,) markers that show the posture."""
 
     time_s: float
     loads: _core.ContactLoads | None
@@ -40,6 +42,8 @@ class _Stepped(NamedTuple):
     segments: tuple[str, ...]
     unmeasured: bool
     blind: bool
+    unseen: npt.NDArray[np.bool_]
+    used: npt.NDArray[np.bool_]
 
 
 class Tracker:
@@ -69,6 +73,7 @@ class Tracker:
         self._filter.report_sensors(True)
         self._labels = Labels.of(self.core_model)
         self._sources = ContactSources.of(self.calibrated)
+        self._sight = LiveSight(self.calibrated.spec)
         self._time: float | None = None
         self._latest: StepEstimate | None = None
         self._stepped: deque[_Stepped] = deque(maxlen=lag + 1)
@@ -158,11 +163,14 @@ class Tracker:
         sources = self._sources.moments(feet)[0]
         if report.tracking in NO_ESTIMATE:
             sources = np.full_like(sources, ABSENT)
+        unseen = self._sources.unseen(self._sight.look(sample.time_s, markers), 1)[0]
+        sources[unseen] = ABSENT
         unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
         blind = feet is not None and bool(feet.blind.any())
         self._off_plates |= feet is not None and stands_off_plates(feet.contact, len(self.calibrated.feet))
         segments = () if feet is None else feet.segments
-        self._stepped.append(_Stepped(sample.time_s, loads, sources, segments, unmeasured, blind))
+        used = self._sight.used
+        self._stepped.append(_Stepped(sample.time_s, loads, sources, segments, unmeasured, blind, unseen, used))
         self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, sources, loads)
         return self._latest
 
@@ -212,12 +220,14 @@ class Tracker:
             if loads is not None:
                 wrench = _core.contact_moments(self.core_model, state, loads)["foot_wrench"]
             segments = () if step is None else step.segments
-            sources = None if step is None else step.sources
+            sources, used = (None, None) if step is None else (step.sources, step.used)
             found |= self.systematic.added(
-                found, state, covariance, wrench, segments, sources=sources, off_plates=self._off_plates, late=late
-            )
+                found, state, covariance, wrench, segments,
+                sources=sources, off_plates=self._off_plates, late=late, used=used,
+            )  # fmt: skip
         if step is not None:
             found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])
+            found |= {name: np.where(step.unseen, np.nan, found[name]) for name in BLOCKS[:3]}
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
 
     def _with_lag(self) -> _core.FixedLag:

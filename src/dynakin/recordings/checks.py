@@ -50,12 +50,14 @@ class PlateCheck:
             began and nothing but the ground pushes. None where the person stands still, or nothing is loaded.
         messages: sentences with numbers; those of something wrong begin with "Warning:".
         refusal: why the plates cannot be used, None where they can. The caller decides what follows from it.
+        unused: they carry nobody although a foot may be on them: a run does without them.
     """
 
     mass_kg_from_plates: float | None
     mean_mass_kg: float | None
     messages: tuple[str, ...]
     refusal: str | None
+    unused: bool = False
 
 
 @dataclass
@@ -101,9 +103,9 @@ def check_plates(
     standing = _on_plates(standing_window(recording), recording, ground)
     frames = standing if standing is not None else slice(None)
     feet = _feet(recording, ground, foot_markers or {}, findings)
-    if mass_kg is None and _nobody_on(recording, ground, feet):
-        findings.say("Nobody steps on the plates: they carry nothing, and no foot is on any.")
-        return PlateCheck(None, None, tuple(findings.messages), None)
+    if mass_kg is None and (idle := _idle(recording, ground, feet)):
+        findings.messages.append(idle)
+        return PlateCheck(None, None, tuple(findings.messages), None, unused=idle.startswith("Warning"))
     mass = _check_vertical(recording, ground, mass_kg, standing, findings)
     if loads is None:
         loads = foot_loads(recording, ground, foot_markers or {})
@@ -142,21 +144,32 @@ def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame
     return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
 
 
-def _nobody_on(recording: Recording, ground: GroundFrame, feet: Mapping[str, Array]) -> bool:
-    """Whether the plates are empty because nobody steps on them, by their corners and the feet (T, K, 2);
-    in another unit of the forces they would be empty below a foot."""
+def _idle(recording: Recording, ground: GroundFrame, feet: Mapping[str, Array]) -> str:
+    """A sentence on plates none of which is ever loaded, a warning unless their corners and the feet (T, K, 2) show
+    that nobody steps on them: under a foot they are dead, or in another unit. Empty where one is loaded."""
     pushes = [np.nan_to_num(ground.vectors_to_ground(plate.force)[:, 1]) for plate in recording.plates]
-    if len(feet) < 2 or max(np.abs(push).max() for push in pushes) > JUDGED_N:
+    most = max(np.abs(push).max() for push in pushes)
+    if most > JUDGED_N:
+        return ""
+    if len(feet) > 1 and all(_beside(plate, ground, feet) for plate in recording.plates):
+        return "Nobody steps on the plates: they carry nothing, and no foot is on any."
+    return (
+        f"Warning: the plates carry nobody in this recording (they read {most:.1f} N at most): it is run as one "
+        "without plates, and the ground reaction follows from the motion. If somebody steps on them, look whether "
+        "their channels were connected and which unit they are in, or give the forces in N (--forces)."
+    )
+
+
+def _beside(plate: Plate, ground: GroundFrame, feet: Mapping[str, Array]) -> bool:
+    """Whether no foot comes near a plate, as far as its corners are known."""
+    if plate.corners is None:
         return False
-    for plate in recording.plates:
-        if plate.corners is None:
+    place = ground.points_to_ground(plate.corners)[:, [0, 2]]
+    for outline in feet.values():
+        points = outline.reshape(-1, 2)
+        away = distance_to_hull(points, np.broadcast_to(place, (len(points), *place.shape)))
+        if not np.isfinite(away).any() or np.nanmin(away) < NEAR_M:
             return False
-        place = ground.points_to_ground(plate.corners)[:, [0, 2]]
-        for outline in feet.values():
-            points = outline.reshape(-1, 2)
-            away = distance_to_hull(points, np.broadcast_to(place, (len(points), *place.shape)))
-            if not np.isfinite(away).any() or np.nanmin(away) < NEAR_M:
-                return False
     return True
 
 
@@ -201,7 +214,10 @@ def _check_vertical(
         when = f"standing still from {start:.4g} s to {stop:.4g} s"
     loaded = loaded[np.isfinite(loaded).all(axis=1)]
     if not len(loaded):
-        findings.refuse(f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N")
+        findings.refuse(
+            f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N, and this model needs it; give "
+            "the forces of the plates that were stood on (--forces), or take --model fullbody, which does without"
+        )
         return None
     mean = loaded.mean(axis=0)
     vertical = float(mean[1])

@@ -77,6 +77,15 @@ class Parameter:
         return math.sqrt(max(self.sd**2 - self.skin_sd**2, 0.0))
 
     @property
+    def bound_tells(self) -> bool:
+        """Whether it tells something that it ends on its bound: it is known better than the bound is far from where it
+        began. The axial inertia of a thigh in a walk is not, and wanders to one by chance."""
+        if not self.at_bound or self.lower is None or self.upper is None:
+            return self.at_bound
+        bound = min(self.lower, self.upper, key=lambda limit: abs(self.value - limit))
+        return self.posterior_sd < abs(self.initial - bound)
+
+    @property
     def is_correction(self) -> bool:
         """A length that starts at 0: a correction of a joint's place, or an amount such as ``knee_roll``."""
         return self.kind == "length" and self.initial == 0.0

@@ -54,7 +54,7 @@ class FootContact:
     Attributes:
         outline: (T, K, 2) m, horizontal places [X, Z of the ground] of its markers, NaN where not seen.
         rise_m: (T, K) height of each marker over its place when the foot stands flat on the floor, NaN where not seen.
-        seen: (T,) one of its markers is.
+        seen: (T,) one of its markers is, for more than one frame.
         under: (T, P) plates whose centre of pressure lies within or near its outline.
         support_m: (T,) height of what it stands on; in between, on the straight line from one to the next.
         support_velocity: (T, 2) m/s, horizontal: a belt's, else 0.
@@ -183,7 +183,8 @@ class _Foot:
         self.lift = np.where(np.isfinite(lowest), lowest, np.nan)  # (T,) of the foot's lowest part
         self.outline = filled_by_others(places[:, :, [0, 2]])
         self.near = [distance_to_hull(plate.cop, self.outline) < NEAR_M for plate in plates]
-        self.seen = np.asarray(np.isfinite(self.lift))
+        # of what is seen for one frame alone nobody knows whether it stands
+        self.seen = np.asarray(np.isfinite(self.speed).any(axis=1)) if n > 1 else np.isfinite(self.lift)
         self.touching, self.level = np.zeros_like(base), np.full(n, np.nan)
         self.waiting: list[tuple[slice, float]] = []  # frames in which it may rest, and its lift there
         if float(np.min(self.flat)) - floor_m < SHOE_M:

@@ -109,7 +109,8 @@ def bounds(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """Constants that end on a bound, and those that touched one."""
     free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
     names = short_marker_names(estimate.marker_names)
-    ending = [p for p in free if p.at_bound]
+    ending = [p for p in free if p.bound_tells]
+    unknown = [parameter_label(p, names) for p in free if p.at_bound and not p.bound_tells]
     stuck = [parameter_label(p, names) for p in ending]
     passing = {n: entry for n, entry in metrics["bounds"]["parameters"].items() if not entry["at_end"]}
     for_a_time = ""
@@ -120,13 +121,19 @@ def bounds(estimate: Estimate, metrics: Metrics) -> Insight | None:
         for_a_time = (
             f" {plural(len(passing), 'other')} touched a bound and left it (longest: {label}, {share} of the time)."
         )
+    if unknown:
+        for_a_time += (
+            f" The recording hardly knows {listed(unknown)}: that {'it ends' if len(unknown) == 1 else 'they end'} on "
+            "a bound says nothing."
+        )
     if not stuck:
-        return Insight("good", "Bounds", f"None of the {len(free)} estimated parameters ends on its bound.{for_a_time}")
-    counts = counts_in_words(metrics["bounds"]["by_kind"])
+        known = f"{len(free) - len(unknown)} estimated parameters{' that the recording knows' if unknown else ''}"
+        return Insight("good", "Bounds", f"None of the {known} ends on its bound.{for_a_time}")
+    counts = "" if unknown else f" ({counts_in_words(metrics['bounds']['by_kind'])})"
     return Insight(
         "warning",
         "Bounds",
-        f"{len(stuck)} of {len(free)} estimated parameters end on a bound ({counts}): {listed(stuck)}. The data ask "
+        f"{len(stuck)} of {len(free)} estimated parameters end on a bound{counts}: {listed(stuck)}. The data ask "
         "for a value that the person cannot have, or joints lie elsewhere than the model has them: it does not fit "
         f"there.{for_a_time}",
         "Check the mass and the height, then the film for a marker of those segments off its place."

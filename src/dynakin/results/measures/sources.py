@@ -78,6 +78,12 @@ def out_of_sight(seen: npt.NDArray[np.bool_], owners: Sequence[str], time: npt.N
     return found
 
 
+def in_use(seen: npt.NDArray[np.bool_], time: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """(T, M) markers that show where the body is: seen (T, M), or not for up to `UNSEEN_S`."""
+    hidden = out_of_sight(seen, [str(k) for k in range(seen.shape[1])], time)
+    return np.stack([~own for own in hidden.values()], axis=1) & seen.any(axis=0)
+
+
 def contact_sources(contact: Codes, undeclared: npt.NDArray[np.bool_] | None = None) -> Codes:
     """Codes (T, C) of contacts' forces, by their status (T, C) (`recordings.feet.contact`).
 
