@@ -119,11 +119,13 @@ Tracking Recovery::doubt() {
   return measured > 0 ? Tracking::doubtful : Tracking::following;
 }
 
-// A search takes as long as many frames, and finds hardly more in the next one than in this: each in vain puts the next
-// off by a quarter more, 1 s at most, so that a motion is found a third later than it could be.
+// A search takes as long as many frames, and finds hardly more in the next one than in this: after one in vain the next
+// waits for a tenth of the time since the first of them, 1 s at most. So a motion is found a tenth later than it could
+// be, at most.
 void Recovery::note_search(bool found) {
-  constexpr double growth = 1.25, longest_s = 1.0;
-  const double pause = memory_.pause_s > 0.0 ? std::min(growth * memory_.sought_s, longest_s) : k_least_pause_s;
+  constexpr double share = 0.1, longest_s = 1.0;
+  const bool first = memory_.pause_s == 0.0;
+  const double pause = first ? k_least_pause_s : std::min(memory_.pause_s + share * memory_.sought_s, longest_s);
   memory_.pause_s = found ? 0.0 : pause;
   memory_.sought_s = 0.0;
 }

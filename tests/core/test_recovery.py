@@ -135,7 +135,7 @@ def test_given_a_motion_that_was_lost_when_markers_return_with_one_astray_then_t
 
 
 @each_spec
-def test_given_markers_that_fit_nothing_when_they_are_right_again_then_the_motion_is_found_a_third_later_at_most(spec):
+def test_given_markers_that_fit_nothing_when_they_are_right_again_then_the_motion_is_found_a_tenth_later_at_most(spec):
     """Each search in vain puts the next one off."""
     markers, wrench = copies(spec)
     random = np.random.default_rng(4)
@@ -143,7 +143,7 @@ def test_given_markers_that_fit_nothing_when_they_are_right_again_then_the_motio
     out = run(spec, markers, wrench)
     assert (out["tracking"][BEGIN + BLIND : END] == LOST).all()
     found = int(np.argmax(out["tracking"] == FOUND))
-    assert END <= found < END + (END - BEGIN) // 3
+    assert END <= found <= END + (END - BEGIN) // 10
     check_rode_through(spec, out, end=found)
 
 
