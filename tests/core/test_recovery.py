@@ -135,6 +135,19 @@ def test_given_a_motion_that_was_lost_when_markers_return_with_one_astray_then_t
 
 
 @each_spec
+def test_given_markers_that_fit_nothing_when_they_are_right_again_then_the_motion_is_found_a_tenth_later_at_most(spec):
+    """Each search in vain puts the next one off."""
+    markers, wrench = copies(spec)
+    random = np.random.default_rng(4)
+    markers[BEGIN:END] = random.uniform(-2.0, 2.0, markers[BEGIN:END].shape)
+    out = run(spec, markers, wrench)
+    assert (out["tracking"][BEGIN + BLIND : END] == LOST).all()
+    found = int(np.argmax(out["tracking"] == FOUND))
+    assert END <= found <= END + (END - BEGIN) // 10
+    check_rode_through(spec, out, end=found)
+
+
+@each_spec
 def test_given_one_marker_lost_for_three_seconds_then_nothing_is_lost(spec):
     markers, wrench = copies(spec)
     markers[BEGIN : BEGIN + 300, 3] = np.nan

@@ -18,6 +18,7 @@ from dynakin.model.definition import load_model
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.recording import Recording
 from dynakin.results.files.config import write_parameters
+from dynakin.results.records import REFUSED
 from dynakin.settings.noise import Noise
 from dynakin.settings.subject import Subject
 from dynakin.simulation.sensors.sizes import SensorNoise
@@ -152,6 +153,23 @@ def test_what_was_found_is_written_and_a_preset_fixes_it(tmp_path: Path) -> None
     assert planar(Noise()).run(recording).config["noise_used"]["variance_scale"] == 1.0
     at_once = planar(Noise(adapt=True)).run(recording, lag_s=0.0).config["noise_used"]["variance_scale"]
     assert at_once == pytest.approx(scale**LATE_SHARE)
+
+
+def test_frames_in_which_limbs_are_astray_say_nothing_of_the_noise() -> None:
+    """More than a third of the markers refused is a lost frame: of some the rest is as before, of most nothing is."""
+    ready = planar(Noise()).prepare(standing(0.001))
+    tracker = ready.tracker.fresh()
+    trial = Trial(ready.recording.time, ready.markers, ready.wrench, ready.contacts)
+    arrays = tracker.run_arrays(*trial[:3], None, trial.contacts)
+    for share, kept in ((0.3, True), (0.7, False)):
+        astray = np.arange(len(trial.time)) >= (1.0 - share) * len(trial.time)
+        verdicts, nis = arrays["verdicts"].copy(), arrays["nis"].copy()
+        verdicts[np.ix_(astray, np.arange(0, verdicts.shape[1] - 1, 2))] = REFUSED
+        nis[astray] *= 100.0
+        noise = calibrated_noise(tracker, arrays | {"verdicts": verdicts, "nis": nis}, trial)
+        alone = calibrated_noise(tracker, arrays, trial, ~astray)
+        assert alone is not None
+        assert (noise and noise.variance_scale) == (alone.variance_scale if kept else None)
 
 
 def test_too_few_frames_leave_the_noise_as_declared() -> None:

@@ -119,7 +119,8 @@ def squat() -> SimulatedTrial:
 
 @pytest.mark.parametrize("lag_s", [0.0, 0.05, np.inf])
 def test_known_truth_what_is_flagged_is_what_is_wrong(squat: SimulatedTrial, lag_s: float) -> None:
-    """From 3 to 4.5 s every marker but the feet's carries another one's label: no posture fits."""
+    """From 3 to 4.5 s every marker but the feet's carries another one's label: no posture fits. The motion is found
+    again a tenth of that later at most."""
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     model = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
     good = dynakin.Estimator(model).run(squat.recording, lag_s=lag_s)
@@ -134,7 +135,7 @@ def test_known_truth_what_is_flagged_is_what_is_wrong(squat: SimulatedTrial, lag
     truth = squat.truth.data["coordinates"].sel(coordinate=found.coordinate_names)
     error = np.abs(found.data["coordinates"].values - truth.transpose("time", "coordinate").values)
     assert np.nanmax(np.degrees(error)) < 25.0  # what is left is right
-    with pytest.raises(LostError, match=r"EKF \(default\): the person was lost.*3\.00 to 4\.49 s"):
+    with pytest.raises(LostError, match=r"EKF \(default\): the person was lost.*3\.00 to 4\.[45]\d s"):
         compare_trial(mislabelled, Setup(Estimator(model), lag_s=lag_s))
 
 

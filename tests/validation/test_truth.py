@@ -16,7 +16,7 @@ from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.methods import Method, Trial, compare_trial
 from dynakin.validation.setup import Setup
-from dynakin.validation.truth import FIGURES, LEG, TRUTH, truth_errors, truth_rows, with_truth_noted
+from dynakin.validation.truth import FIGURES, LEG, TRUTH, against_truth, truth_errors
 
 
 @pytest.fixture(scope="module")
@@ -82,15 +82,15 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Trial:
 
 
 def test_every_method_of_a_simulated_trial_has_every_figure(compared: Trial) -> None:
-    rows = truth_rows([compared])
+    _, rows = against_truth([compared])
     assert {(row.quantity, row.method) for row in rows} == {(q, m.name) for q, _ in FIGURES for m in compared.methods}
     assert all(row.rms.n == 1 and row.rms.mean is not None for row in rows)
     elsewhere = {name: replace(e, recording=replace(e.recording, path=None)) for name, e in compared.estimates.items()}
-    assert truth_rows([replace(compared, estimates=elsewhere)]) == []
+    assert against_truth([replace(compared, estimates=elsewhere)])[1] == []
 
 
 def test_a_truth_of_another_model_is_left_out_and_that_is_said(compared: Trial) -> None:
-    assert with_truth_noted(compared) is compared
+    assert against_truth([compared])[0] == [compared]
     in_space = {"ankle": "ankle_angle_r", "knee": "knee_angle_r", "hip": "hip_flexion_r"}
     path = Path(str(next(iter(compared.estimates.values())).recording.path)).with_name(TRUTH)
     with xr.open_dataset(path) as stored:
@@ -98,8 +98,9 @@ def test_a_truth_of_another_model_is_left_out_and_that_is_said(compared: Trial) 
     names = [in_space.get(str(name), str(name)) for name in kept["coordinate"].values]
     kept.assign_coords(coordinate=names).to_netcdf(path)  # as a simulation of fullbody has it
     try:
-        assert truth_rows([compared]) == []
-        (note,) = (note for note in with_truth_noted(compared).notes if "another model" in note)
+        (noted,), rows = against_truth([compared])
+        assert rows == []
+        (note,) = (note for note in noted.notes if "another model" in note)
         assert note.endswith("which has no ankle, hip and knee.") and str(path) in note
     finally:
         kept.to_netcdf(path)
@@ -122,7 +123,7 @@ def test_methods_are_judged_over_the_moments_that_all_have_measured(compared: Tr
     filtered = saying("EKF (default)", np.where(derived, true + 50.0, true + 1.0), DERIVED)
     inverse = saying("IK + ID (6 Hz)", np.where(derived, np.nan, true + 2.0), ABSENT)
     inverse.moments[:, knee] = np.nan  # and no frame at all of one joint
-    both = truth_rows([replace(compared, methods=(filtered, inverse))])
+    _, both = against_truth([replace(compared, methods=(filtered, inverse))])
     found = {row.method: row.rms.mean for row in both if row.quantity == "moments"}
     assert found == {"EKF (default)": pytest.approx(1.0), "IK + ID (6 Hz)": pytest.approx(2.0)}
     text = truth_text(both)

@@ -68,8 +68,8 @@ def compare(
     if identify_trial is not None:
         tables |= print_held_out(console, [(cases[0], cases[1], False)], notes)
     else:
-        compared = compare_cases(cases)
-        tables |= print_comparison(console, compared)
+        compared, truth = compare_cases(cases)
+        tables |= print_comparison(console, compared, truth)
         try:
             if halved:
                 tables |= print_held_out(console, [(*halves_of(case), True) for case in cases], notes)

@@ -20,21 +20,22 @@ from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.held_out import identify_on, judge, predict_blind
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.table2 import merged, table2
-from dynakin.validation.truth import truth_rows, with_truth_noted
+from dynakin.validation.truth import TruthRow, against_truth
 from dynakin.validation.unseen import unseen, unseen_figures
 
 
-def compare_cases(cases: Sequence[Case]) -> list[Trial]:
-    """All methods on all trials."""
+def compare_cases(cases: Sequence[Case]) -> tuple[list[Trial], list[TruthRow]]:
+    """All methods on all trials, and their errors where the truth is known."""
     compared = []
     for case in cases:
         with stage(case.recording.name) as progress:
-            trial = compare_trial(case.recording, case.setup, static=case.static, progress=progress)
-            compared.append(with_truth_noted(trial))
-    return compared
+            compared.append(compare_trial(case.recording, case.setup, static=case.static, progress=progress))
+    return against_truth(compared)
 
 
-def print_comparison(console: Console, compared: Sequence[Trial]) -> dict[str, Sequence[Any]]:
+def print_comparison(
+    console: Console, compared: Sequence[Trial], truth: Sequence[TruthRow]
+) -> dict[str, Sequence[Any]]:
     """Table II, angles and moments on screen; the rows by the name of their file."""
     rows, angles, moments = table2(compared), angle_differences(compared), moment_differences(compared)
     first = compared[0]
@@ -48,7 +49,6 @@ def print_comparison(console: Console, compared: Sequence[Trial]) -> dict[str, S
         console.print(as_table(angle_text(angles)))
     if moments:
         console.print(as_table(moment_text(moments)))
-    truth = truth_rows(compared)
     if truth:
         console.print(as_table(truth_text(truth)))
     for trial in compared:

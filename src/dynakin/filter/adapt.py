@@ -21,7 +21,8 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.noise import joint_groups
 from dynakin.filter.tracker import Tracker
 from dynakin.progress import Progress
-from dynakin.results.records import FOLLOWING
+from dynakin.results.measures.tracking import ANY_ASTRAY
+from dynakin.results.records import FOLLOWING, REFUSED
 from dynakin.settings.noise import JointGroup, Noise
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +35,9 @@ SETTLING_S = 0.3
 """Left out of it: the first frames' covariances are the priors'."""
 LEAST_FRAMES = 25
 """Fewer say nothing: a quarter of a second."""
+LEAST_SHARE = 0.5
+"""Part of the frames with markers that must be followed: of a motion that is lost for longer, innovations say how wrong
+it is, not how large the noise is."""
 JERK_SHARE: dict[JointGroup, float] = {"feet": 1.0}
 OTHER_JERK_SHARE = 0.5
 """Part of a jerk scale's logarithm that is believed: jerk is not white, and what fits the next frame best is too little
@@ -66,7 +70,7 @@ def calibrated_noise(
     late: bool = False,
     progress: Progress | None = None,
 ) -> Noise | None:
-    """The noise with the scales that a recording asks for; None where it is too short.
+    """The noise with the scales that a recording asks for; None where too few of its frames are followed.
 
     One more pass, until somebody was followed for `CALIBRATED_S`, for a floating model, none for one that is fixed in
     the ground.
@@ -80,12 +84,12 @@ def calibrated_noise(
         chosen &= frames
     noise = tracker.noise
     ratio = nis_per_row(arrays, chosen)
-    if ratio is None:
+    if ratio is None or not _mostly_followed(arrays, chosen):
         return None
-    first = int(np.argmax(arrays["tracking"][: len(trial.time)] == FOLLOWING))
+    first = int(np.argmax(followed(arrays, len(trial.time))))
     end = int(np.searchsorted(trial.time, trial.time[first] + CALIBRATED_S, side="right"))
     groups, before = joint_groups(tracker.calibrated), nis_per_row(arrays, chosen[:end])
-    if not groups or before is None:
+    if not groups or before is None or not _mostly_followed(arrays, chosen[:end]):
         return _believed(_scaled(noise, ratio), noise, late)
     scaled = _scaled(noise, ratio, jerk_ratios(tracker, arrays, trial.time, chosen, groups))
     time, markers, wrench, contacts = trial.first(end)
@@ -103,9 +107,23 @@ def nis_per_row(arrays: dict[str, Array], chosen: Flags) -> float | None:
     None where they are too few."""
     end = len(chosen)
     nis, rows = arrays["nis"][:end], arrays["n_rows"][:end]
-    used = chosen & np.isfinite(nis) & (rows > 0) & (arrays["tracking"][:end] == FOLLOWING)
+    used = chosen & np.isfinite(nis) & (rows > 0) & followed(arrays, end)
     total = float(nis[used].sum() / rows[used].sum()) if used.sum() >= LEAST_FRAMES else 0.0
     return total if total > 0.0 else None
+
+
+def followed(arrays: dict[str, Array], end: int) -> Flags:
+    """(end,) of the first frames those that the filter followed, without refusing so many markers that the frame counts
+    as lost (`results.measures.tracking`): of limbs that are astray it says nothing."""
+    verdicts = arrays["verdicts"][:end, :-1]
+    refused, measured = (verdicts == REFUSED).sum(axis=1), (verdicts > 0).sum(axis=1)
+    return np.asarray((arrays["tracking"][:end] == FOLLOWING) & (refused <= ANY_ASTRAY * measured))
+
+
+def _mostly_followed(arrays: dict[str, Array], chosen: Flags) -> bool:
+    """Of the chosen frames with markers."""
+    seen = chosen & (arrays["verdicts"][: len(chosen), :-1] > 0).any(axis=1)
+    return bool(followed(arrays, len(chosen))[seen].sum() >= LEAST_SHARE * seen.sum())
 
 
 def jerk_ratios(
@@ -124,7 +142,7 @@ def jerk_ratios(
     value, variance = arrays["state"][: len(time), block], arrays["state_sd"][: len(time), block] ** 2
     change = np.diff(value, axis=0) ** 2
     expected = variance[:-1] + density[block] * np.diff(time)[:, None] - variance[1:]
-    following = arrays["tracking"][: len(time)] == FOLLOWING
+    following = followed(arrays, len(time))
     used = chosen[1:] & following[1:] & following[:-1]
     change, expected = change[used].sum(axis=0), expected[used].sum(axis=0)
     found: dict[JointGroup, float] = {}

@@ -11,7 +11,14 @@ import numpy.typing as npt
 
 from dynakin.arrays import rms
 from dynakin.bindings import _core
-from dynakin.filter.noise import jerk_densities, joint_groups, plate_sd, soft_tissue_sd, soft_tissue_time_s
+from dynakin.filter.noise import (
+    BEGUN_SD,
+    jerk_densities,
+    joint_groups,
+    plate_sd,
+    soft_tissue_sd,
+    soft_tissue_time_s,
+)
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
 from dynakin.settings.model import QUANTITIES, Quantity
@@ -101,12 +108,6 @@ def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[s
     sd |= {f"plates/{name}": float(value) for name, value in zip(COMPONENTS, plate_sd(noise), strict=True)}
     sd |= {f"contact/{name}/{axis}": 1.0 for name in spec.contacts for axis in COMPONENTS}
     return sd | {"plates/delay": noise.plate_delay_sd_s}
-
-
-BEGUN_SD = {"speed": 3.0, "acceleration": 40.0}
-"""How fast people move when a recording begins, rad or m a second, a second squared: the knee of a walk swings at 7 and
-gains speed by 40 to 80. By the priors (1 and 10), scaled as the noise, hips of walks were 45 N m off in the first 50
-ms, said to 8."""
 
 
 def variance_scales(names: Collection[str], noise: Noise) -> Array:

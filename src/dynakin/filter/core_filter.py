@@ -11,6 +11,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ConfigError
 from dynakin.filter.augment import continuous_noise, extended, initial_covariance
 from dynakin.filter.noise import (
+    SOUGHT_SD,
     gate_limits,
     limit_sd,
     marker_variance,
@@ -23,9 +24,6 @@ from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
-
-_FOUND_SD = {"coordinate_sd": 0.5, "speed_sd": 2.0, "acceleration_sd": 20.0}
-"""Of a motion that is begun again: rad or m, a second, a second squared, by the declared variances."""
 
 
 def core_filter(
@@ -61,8 +59,8 @@ def filter_settings(
         )
     point = noise.reference_point_m
     unseen = unseen_limit(noise)
-    found = {name: limit_sd(noise, sd) for name, sd in _FOUND_SD.items()}
-    recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen, **found) if noise.recover else None
+    sought = {f"{name}_sd": limit_sd(noise, sd) for name, sd in SOUGHT_SD.items()}
+    recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen, **sought) if noise.recover else None
     density, decay = continuous_noise(initial, noise, layout)
     return _core.FilterSettings(
         process_variance=process_variance(noise, layout),

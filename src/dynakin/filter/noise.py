@@ -94,6 +94,14 @@ def gate_limits(probability: float, scale: float = 1.0) -> list[float] | None:
     return [float(chdtri(rows, probability)) / min(scale, 1.0) for rows in range(1, 7)]
 
 
+BEGUN_SD = {"speed": 3.0, "acceleration": 40.0}
+"""How fast people move when a recording begins, rad or m a second, a second squared: the knee of a walk swings at 7 and
+gains speed by 40 to 80. By the priors (1 and 10), scaled as the noise, hips of walks were 45 N m off in the first 50
+ms, said to 8."""
+SOUGHT_SD = {"coordinate": 0.5, "speed": 2.0, "acceleration": 20.0}
+"""The same of a motion that was lost and is sought anew, by the declared variances. Half as much: markers that were
+refused until now may be wrong still, and the less a speed is known the more of them the next frames agree with."""
+
 LEAST_UNSEEN_SD = 0.25
 """rad or m: 3 rad/s and m/s for a frame at 25 Hz, twice."""
 
@@ -106,7 +114,7 @@ def limit_sd(noise: Noise, declared: float | None) -> float:
 
 def unseen_limit(noise: Noise) -> float:
     """From which deviation of a coordinate on (rad or m) nobody sees it, and it is held: `Noise.unseen_sd` by
-    `limit_sd`, but not so little that the first step of a motion of unknown speed (`augment.BEGUN_SD`) comes near it.
+    `limit_sd`, but not so little that the first step of a motion of unknown speed (`BEGUN_SD`) comes near it.
     """
     if noise.unseen_sd is None:
         return np.inf

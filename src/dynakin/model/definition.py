@@ -221,7 +221,7 @@ class ModelDefinition:
         messages += said
         return CalibratedModel(
             spec=spec,
-            **state._asdict(),
+            **vars(state),
             marker_variance=np.array([site.variance for site in plan.sites]),
             soft_tissue_m=np.array([site.soft_tissue_m for site in plan.sites]),
             unmodelled_m=_MODEL_M if plan.model.sided else 0.0,

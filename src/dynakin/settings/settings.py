@@ -237,8 +237,15 @@ def read_keys(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
         content["functional"] = {
             joint: str(path.parent / file) if isinstance(file, str) else file for joint, file in functional.items()
         }
-    for key in ("model", "markers", "table", "preset"):  # a name, or a file next to the configuration
-        value = content.get(key)
-        if isinstance(value, str) and is_file(path.parent / value):
-            content[key] = str(path.parent / value)
-    return content
+    return with_named_files(content, path)
+
+
+def with_named_files(content: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """The keys of (a part of) a configuration file, of which some have a name or a file next to it."""
+    named = {key: content[key] for key in ("model", "markers", "table", "preset") if isinstance(content.get(key), str)}
+    return dict(content) | {key: named_beside(path, value) for key, value in named.items()}
+
+
+def named_beside(path: Path, value: str) -> str:
+    """What a configuration file names: a file next to it where there is one, else the name as it is."""
+    return str(path.parent / value) if is_file(path.parent / value) else value

@@ -55,8 +55,9 @@ class TruthRow:
     rms: Spread
 
 
-def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
-    """Every method's errors on the trials that were simulated by dynakin; empty where none was.
+def against_truth(trials: Sequence[Trial]) -> tuple[list[Trial], list[TruthRow]]:
+    """Every method's errors on the trials that were simulated by dynakin, none where none was; and the trials, with a
+    note where one was simulated with a model of other coordinates, so that no error can be had.
 
     All methods over the same frames of each quantity: those that each of them has, moments only where they are
     measured for all. A filter has derived and prior moments too, which are harder, inverse dynamics none.
@@ -64,16 +65,23 @@ def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
     import xarray as xr  # the slowest library of all, which reading a trial does without
 
     found: dict[tuple[str, str, str], list[float]] = {}
+    noted: list[Trial] = []
     for trial in trials:
+        noted.append(trial)
         path = _truth_file(trial)
         if path is None:
             continue
         with xr.open_dataset(path) as truth:
-            joints = _leg_joints(trial)
-            if not _is_of(truth, trial) or set(joints) - {str(name) for name in truth["coordinate"].values}:
-                continue  # another recording's, or another model's (`with_truth_noted`)
-            turning = {str(name) for name in truth["coordinate"].values}
-            turning &= {n for n, turns in zip(trial.coordinate_names, trial.rotation, strict=True) if turns}
+            if not _is_of(truth, trial):
+                continue  # another recording's
+            joints, known = _leg_joints(trial), {str(name) for name in truth["coordinate"].values}
+            if lacking := set(joints) - known:
+                note = (
+                    f"The truth in {path} is left out: it is of another model, which has no {listed(sorted(lacking))}."
+                )
+                noted[-1] = replace(trial, notes=(*trial.notes, note))
+                continue
+            turning = known & {n for n, turns in zip(trial.coordinate_names, trial.rotation, strict=True) if turns}
             paths = truth["coordinates"].transpose("time", "coordinate")
             moving = [
                 n for n in trial.coordinate_names if n in turning and np.ptp(paths.sel(coordinate=n).values) > 0.0
@@ -82,22 +90,8 @@ def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
                 values = truth_errors(method.name, data, truth, trial.window, joints, moving).values
                 for (quantity, unit), value in zip(FIGURES, values, strict=True):
                     found.setdefault((quantity, unit, method.name), []).append(value)
-    return [TruthRow(*key, spread([v for v in values if np.isfinite(v)])) for key, values in found.items()]
-
-
-def with_truth_noted(trial: Trial) -> Trial:
-    """The trial with a note where it was simulated with a model of other coordinates, so that no error can be had."""
-    import xarray as xr
-
-    path = _truth_file(trial)
-    if path is None:
-        return trial
-    with xr.open_dataset(path) as truth:
-        lacking = set(_leg_joints(trial)) - {str(name) for name in truth["coordinate"].values}
-        if not lacking or not _is_of(truth, trial):
-            return trial
-    note = f"The truth in {path} is left out: it is of another model, which has no {listed(sorted(lacking))}."
-    return replace(trial, notes=(*trial.notes, note))
+    rows = [TruthRow(*key, spread([v for v in values if np.isfinite(v)])) for key, values in found.items()]
+    return noted, rows
 
 
 def _truth_file(trial: Trial) -> Path | None:

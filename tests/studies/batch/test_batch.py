@@ -105,6 +105,22 @@ def test_results_of_each_trial_are_written(study: Path, tmp_path: Path) -> None:
     assert (tmp_path / "out" / "one" / "markers" / "report.html").is_file()
 
 
+def test_presets_that_are_files_lie_beside_the_dataset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "study").mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    for name in ("own", "hers", "his"):
+        (tmp_path / "study" / f"{name}.toml").write_text('base = "default"\n')
+    (tmp_path / "study" / "study.toml").write_text(
+        'output = "o"\npresets = ["own.toml", "paper"]\n[[subjects]]\nname = "a"\npreset = "hers.toml"\n'
+        'trials = [{trial = "x.c3d"}, {trial = "y.c3d", preset = "his.toml"}, {trial = "z.c3d", preset = "paper"}]\n'
+    )
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    found = read_dataset(Path("../study/study.toml"))
+    assert found.presets == ("../study/own.toml", "paper")
+    expected = ["../study/hers.toml", "../study/his.toml", "paper"]
+    assert [session.content["preset"] for session in found.sessions] == expected
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -42,16 +41,31 @@ class JointPrior:
 
 
 @dataclass(frozen=True, eq=False)
-class CalibratedModel:
-    """A model calibrated on one person, and the state from which the filter starts; order of n: the core's layout.
+class StartingState:
+    """What is known of each element of the state before the filter starts; order of n: the core's layout.
 
     Attributes:
-        spec: the core's specification.
         names: (n,) names of the state's elements.
         x0: (n,) state at the first usable frame; speeds and accelerations 0.
         sd0: (n,) prior standard deviations.
         lower, upper: (n,) bounds of (9), infinite where there are none.
         table: (n,) values of the inertia table, NaN for elements that it does not hold.
+    """
+
+    names: tuple[str, ...]
+    x0: Array
+    sd0: Array
+    lower: Array
+    upper: Array
+    table: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedModel(StartingState):
+    """A model calibrated on one person, and the state from which the filter starts.
+
+    Attributes:
+        spec: the core's specification.
         marker_variance: (M,) m^2, R of each marker as its set gives it.
         soft_tissue_m: (M,) declared size of the displacement of skin and flesh under each marker.
         ground: ground frame whose origin is the model's ground landmark (the toe).
@@ -82,12 +96,6 @@ class CalibratedModel:
     """
 
     spec: _core.ModelSpec
-    names: tuple[str, ...]
-    x0: Array
-    sd0: Array
-    lower: Array
-    upper: Array
-    table: Array
     marker_variance: Array
     soft_tissue_m: Array
     ground: GroundFrame
@@ -144,17 +152,6 @@ class CalibratedModel:
                 f"model {self.spec.name} comes from an OpenSim file; expected a built-in model or a .toml file for this"
             )
         return self.plan
-
-
-class StartingState(NamedTuple):
-    """What a `CalibratedModel` says of each element of the state."""
-
-    names: tuple[str, ...]
-    x0: Array
-    sd0: Array
-    lower: Array
-    upper: Array
-    table: Array
 
 
 def starting_state(

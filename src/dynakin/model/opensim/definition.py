@@ -184,7 +184,7 @@ class OpenSimDefinition:
         messages += said
         return CalibratedModel(
             spec=spec,
-            **state._asdict(),
+            **vars(state),
             marker_variance=skin[:, 0],
             soft_tissue_m=skin[:, 1],
             ground=frame,

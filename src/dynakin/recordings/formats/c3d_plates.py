@@ -18,13 +18,12 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plate_types import TYPES, plate_wrench
 from dynakin.recordings.limits import check_wrench
-from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
 from dynakin.units import force_factor, moment_factor
 
-_CERTAIN_LOAD_N = 50.0  # a push that no offset of a plate in order reaches
 _LASTING_PULL = 0.02
 _CENTRED_M = 0.003
 _OFFSET_WORTH_A_NOTE_N = 5.0
@@ -218,7 +217,7 @@ def _calibration(parameters: Parameters, k: int, kind: int) -> Array | None:
 
 def _at_centre(wrench: Array) -> bool:
     """Whether a wrench (6, N), N and N m, acts at the middle of its plate all the time: nobody stands so still."""
-    loaded = wrench[:, np.abs(wrench[2]) > _CERTAIN_LOAD_N]
+    loaded = wrench[:, np.abs(wrench[2]) > JUDGED_N]
     if not loaded.size:
         return False
     away = np.hypot(loaded[3], loaded[4]) / np.abs(loaded[2])
@@ -252,8 +251,8 @@ def _factors(
 
 def _offset_note(raw: _Raw) -> list[str]:
     push = raw.force @ raw.surface.normal
-    idle = np.abs(push) < _CERTAIN_LOAD_N
-    pulls = push < -_CERTAIN_LOAD_N
+    idle = np.abs(push) < JUDGED_N
+    pulls = push < -JUDGED_N
     if pulls.mean() > _LASTING_PULL:
         return [
             f"Warning: {raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in "

@@ -18,7 +18,7 @@ LOADED_N = 20.0
 is what it takes to say which foot presses."""
 JUDGED_N = 50.0
 """Push from which something is said of a plate: a load where no foot stands, a force beyond friction, standing. What is
-lighter may be a cable, a step on the edge, a drift."""
+lighter may be a cable, a step on the edge, a drift; no offset of a plate in order reaches it."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any
 from dynakin.errors import ConfigError
 from dynakin.files import is_file
 from dynakin.settings.presets import preset
-from dynakin.settings.settings import RECORDED, Settings, read_keys
+from dynakin.settings.settings import RECORDED, Settings, named_beside, read_keys, with_named_files
 from dynakin.settings.strict import nearest
 
 # Keys of their own; all others are those of a run's configuration and hold for everything below them.
@@ -78,6 +78,7 @@ def read_dataset(path: Path, output: Path | None = None) -> Dataset:
     presets = content.get("presets", [])
     if not isinstance(presets, list) or not all(isinstance(name, str) for name in presets):
         raise ConfigError(f"{path}: presets is {presets!r}, expected a list of names")
+    presets = [named_beside(path, name) for name in presets]
     check_presets(presets, f"{path}: presets")
     for session in sessions:
         Settings.of(session.content, f"{path}: {session.name}")
@@ -114,7 +115,7 @@ def _sessions(
         raise ConfigError(f"{path}: subject {number} has no name, expected a text without /")
     _check_name(f"{path}: subject {number}: name", name)
     where = f"{path}: subject {name!r}"
-    keys = common | _run_keys(entry, _OF_SUBJECT, where)
+    keys = common | with_named_files(_run_keys(entry, _OF_SUBJECT, where), path)
     folder = path.parent / str(entry.get("folder", name))
     trials = entry.get("trials", pattern)
     if isinstance(trials, str):
@@ -131,7 +132,7 @@ def _sessions(
         ]
     if not isinstance(trials, list) or not all(isinstance(t, dict) and isinstance(t.get("trial"), str) for t in trials):
         raise ConfigError(f'{where}: trials, expected a pattern such as "*.c3d" or tables with `trial`')
-    return [_session(where, name, folder, dict(trial), keys, output) for trial in trials]
+    return [_session(where, name, folder, with_named_files(trial, path), keys, output) for trial in trials]
 
 
 def _matching(folder: Path, pattern: str, where: str) -> list[Path]:
