@@ -41,9 +41,9 @@ double Correction::uncertainty_seen() const {
   return std::sqrt(most);
 }
 
-void Correction::correct(const MarkerRef& markers, const Vector6& wrench, bool iterates) {
+void Correction::correct(const MarkerRef& markers, const Vector6& wrench) {
   constexpr int most_iterations = 8;
-  if (iterates && uncertainty_seen() > settings.iterate_beyond) return iterate(markers, wrench, most_iterations);
+  if (uncertainty_seen() > settings.iterate_beyond) return iterate(markers, wrench, most_iterations);
   leave_out_refused();
   sums = update_.apply(measurement.blocks(), now.P, dx);
   note_linearised();

@@ -8,11 +8,6 @@
 #include "dynakin/process.hpp"
 
 namespace dynakin {
-namespace {
-
-constexpr double k_least_pause_s = 1e-6;  // shorter than any frame
-
-}  // namespace
 
 const char* describe(Tracking tracking) {
   static constexpr const char* words[] = {"following", "doubtful", "lost", "found", "restarted"};
@@ -40,7 +35,7 @@ void Recovery::start() {
 void Recovery::restart() {
   now_ = start_;
   memory_.unbelieved_s = k_infinity;
-  memory_.pause_s = 0.0;
+  memory_.vain_s = memory_.pause_s = 0.0;
   memory_.held = true;
   if (c_.tape) c_.tape->cut = true;
 }
@@ -53,11 +48,13 @@ double Recovery::carried_of(double dt) {
   const double unbelieved = memory_.unbelieved_s;
   memory_.unbelieved_s += dt;
   memory_.sought_s += dt;
+  memory_.vain_s += dt;
+  memory_.pause_s -= dt;
   if (!settings_.enabled) return dt;
   if (dt > 0.0) memory_.shortest_step_s = std::min(memory_.shortest_step_s, dt);
   const double left = memory_.held ? 0.0 : std::clamp(1.5 * memory_.shortest_step_s, blind, 2.0 * blind) - unbelieved;
   if (!memory_.held && dt <= left + rounding) return dt;
-  if (!memory_.held) memory_.pause_s = 0.0;
+  if (!memory_.held) memory_.vain_s = memory_.pause_s = 0.0;
   memory_.held = true;
   return std::clamp(left, 0.0, dt);
 }
@@ -119,27 +116,19 @@ Tracking Recovery::doubt() {
   return measured > 0 ? Tracking::doubtful : Tracking::following;
 }
 
-// A search takes as long as many frames, and finds hardly more in the next one than in this: after one in vain the next
-// waits for a tenth of the time since the first of them, 1 s at most. So a motion is found a tenth later than it could
-// be, at most.
-void Recovery::note_search(bool found) {
-  constexpr double share = 0.1, longest_s = 1.0;
-  const bool first = memory_.pause_s == 0.0;
-  const double pause = first ? k_least_pause_s : std::min(memory_.pause_s + share * memory_.sought_s, longest_s);
-  memory_.pause_s = found ? 0.0 : pause;
-  memory_.sought_s = 0.0;
-}
-
 // Of a motion that is held: from where it is and from the posture of the first frame, then from both turned as a whole
-// to where the markers are. What leaves the fewest refused, half of them at most, is taken.
+// to where the markers are. What leaves the fewest refused, half of them at most, is taken. A search takes as long as
+// many frames, and finds hardly more in the next one than in this: after one in vain the next waits for a tenth of the
+// time since the first of them, so that a motion is found a tenth later at most than it could be.
 Tracking Recovery::seek(const MarkerRef& markers) {
+  constexpr double share = 0.1, longest_s = 1.0;
   const int n = model_.n_free(), measured = gate_.markers_measured();
   bool found = false;
   kept_ = now_;
   int fewest = measured / 2 + 1;
   const bool enough = measured > 0 && 2 * measured >= measurement_.markers_in_use();
-  if (!enough) memory_.pause_s = 0.0;  // markers that come back are looked at as soon as they do
-  const bool seeks = enough && memory_.sought_s >= memory_.pause_s;
+  if (!enough) memory_.vain_s = memory_.pause_s = 0.0;  // markers that come back are looked at as soon as they do
+  const bool seeks = enough && memory_.pause_s <= 0.0;
   for (int k = 0; seeks && k < 4 && fewest > 0; ++k) {
     now_.x.head(n) = (k % 2 == 0 ? kept_ : start_).x.head(n);
     now_.P = kept_.P;
@@ -150,7 +139,7 @@ Tracking Recovery::seek(const MarkerRef& markers) {
     best_ = posture_;
     found = true;
   }
-  if (seeks) note_search(found);
+  if (seeks) memory_.pause_s = std::min(share * memory_.vain_s, longest_s);
   if (found) {
     if (fewest > 0) {
       now_.x = best_;
@@ -263,11 +252,11 @@ double Recovery::distance_within_bounds(const MarkerRef& markers) {
 
 // Corrects so that the markers used lie within fit_m of the estimate; those that lie further off are refused, and the
 // rest is used without them. False, and all as in kept_, where most would have to be refused.
-bool Recovery::correct_to_fit(const MarkerRef& markers, const Vector6& wrench, bool iterates) {
+bool Recovery::correct_to_fit(const MarkerRef& markers, const Vector6& wrench) {
   constexpr int rounds = 3;
   const double most = settings_.fit_m;
   for (int round = 0; round < rounds; ++round) {
-    c_.correct(markers, wrench, iterates);
+    c_.correct(markers, wrench);
     if (!c_.sums.factored) return true;  // broken down, which the step will say
     ahead_ = now_.x;
     retract(ahead_, c_.dx);
@@ -286,27 +275,23 @@ bool Recovery::correct_to_fit(const MarkerRef& markers, const Vector6& wrench, b
 // the gate may have agreed with anything; where a coordinate is held unseen, the gate, which knows tangents only, may
 // refuse the markers of a segment that has turned too far. If some do not fit the corrected estimate either, or were
 // refused, as all those of a segment that went astray, then a motion that leaves half as many out is sought; that takes
-// long and costs all that is known of speeds, so it is not tried again before blind_s has passed, or longer after one
-// in vain (note_search); meanwhile frames that refuse markers are linearised once.
+// long and costs all that is known of speeds, so it is not tried again before blind_s has passed.
 Tracking Recovery::fit(const MarkerRef& markers, const Vector6& wrench) {
   const int measured = gate_.markers_measured();
-  const bool refuses = gate_.markers_refused() > 0, astray = unseen_ && refuses;
-  const bool may_seek = memory_.sought_s > std::max(settings_.blind_s, memory_.pause_s);
-  const bool iterates = !refuses || may_seek || memory_.pause_s == 0.0;  // what was sought in vain stays astray so long
+  const bool astray = unseen_ && gate_.markers_refused() > 0;
   if (measured == 0 || (distance(markers) <= settings_.fit_m && !astray)) {
-    c_.correct(markers, wrench, iterates);
+    c_.correct(markers, wrench);
     if (measured > 0) memory_.unbelieved_s = 0.0;
-    if (measured > 0 && !refuses) memory_.pause_s = 0.0;
     return Tracking::following;
   }
   kept_ = now_;
   Tracking tracking = Tracking::following;
-  bool fits = correct_to_fit(markers, wrench, iterates);
-  if ((!fits || gate_.markers_refused() > 0) && may_seek) {
+  bool fits = correct_to_fit(markers, wrench);
+  if ((!fits || gate_.markers_refused() > 0) && memory_.sought_s > settings_.blind_s) {
+    memory_.sought_s = 0.0;
     now_ = kept_;
     if (seek_better(markers, wrench, (fits ? gate_.markers_refused() : measured) / 2)) tracking = Tracking::found;
-    note_search(tracking == Tracking::found);
-    fits = tracking == Tracking::found || correct_to_fit(markers, wrench, iterates);
+    fits = tracking == Tracking::found || correct_to_fit(markers, wrench);
   }
   if (fits) {
     memory_.unbelieved_s = 0.0;

@@ -18,8 +18,8 @@ struct Correction {
   // Rows of all sensors that this frame measures, at the present state, and a verdict on each.
   void measure(const MarkerRef& markers, const Vector6& wrench);
   // P is corrected and dx is what the state has still to take. A state that is known badly is linearised again where
-  // the measurements have it, if that is asked for.
-  void correct(const MarkerRef& markers, const Vector6& wrench, bool iterates = true);
+  // the measurements have it.
+  void correct(const MarkerRef& markers, const Vector6& wrench);
   // Gauss-Newton steps of the one update (iterated extended Kalman filter, Bell and Cathey 1993), from a measurement
   // that has been linearised at x. The sums are those of the first step: of the innovation as it was predicted.
   void iterate(const MarkerRef& markers, const Vector6& wrench, int most);

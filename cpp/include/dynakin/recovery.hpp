@@ -18,8 +18,9 @@ class Recovery {
   // What later frames depend on.
   struct Memory {
     double unbelieved_s = 0.0;     // since a frame whose markers were believed
-    double sought_s = k_infinity;  // since a motion was last sought
-    double pause_s = 0.0;          // after a search in vain, until the next; 0: the last one was not
+    double sought_s = k_infinity;  // since a better motion was last sought than one that is followed
+    double vain_s = 0.0;           // since one that is held was first sought in vain
+    double pause_s = 0.0;          // until it is sought next
     double shortest_step_s = k_infinity;
     bool held = false;  // the motion is lost, and to be found before anything is believed
   };
@@ -45,7 +46,6 @@ class Recovery {
  private:
   bool believes_most() const { return 2 * gate_.markers_refused() <= gate_.markers_measured(); }
   double carried_of(double dt);
-  void note_search(bool found);
   void expect_impact();
   Tracking doubt();
   Tracking seek(const MarkerRef& markers);
@@ -53,7 +53,7 @@ class Recovery {
   bool seek_better(const MarkerRef& markers, const Vector6& wrench, int refused);
   bool turn_towards(const MarkerRef& markers);
   Tracking fit(const MarkerRef& markers, const Vector6& wrench);
-  bool correct_to_fit(const MarkerRef& markers, const Vector6& wrench, bool iterates);
+  bool correct_to_fit(const MarkerRef& markers, const Vector6& wrench);
   bool judge_by_distance(const MarkerRef& markers);
   double squared_distance(const MarkerRef& markers, std::size_t m) const;
   double distance(const MarkerRef& markers) const;
