@@ -14,6 +14,7 @@ cell is a missing value, a line that begins with ``#`` a remark::
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -24,6 +25,7 @@ from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows, trial_name
+from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.formats.trajectories import clean_markers, length_unit, timing_notes
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.resampling import ReadOptions
@@ -70,6 +72,8 @@ def read_csv(path: Path, options: ReadOptions | None = None) -> Recording:
     forces = [name for name in table.names if parse_column(name)]
     rest = [name for name in table.names if name not in forces]
     names, raw = _markers(table, rest)
+    time, stamp_notes = settled_times(table.time, raw)
+    table = replace(table, time=time, notes=(*table.notes, *stamp_notes))
     factor, unit, unit_notes = (1.0, "m", []) if forces else _unit(raw)
     markers, notes = clean_markers(names, raw * factor, table.time, table.path)
     recording = Recording(
