@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
-from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
+from dynakin.model.calibration.checks import check_masses, check_standing, fixed_lengths, reach, refuse_moving_origin, report
 from dynakin.model.calibration.completion import Completed, completed
 from dynakin.model.calibration.flat_feet import flat_slopes, never_flat, usual_slopes
 from dynakin.model.calibration.frames import Trial, choose_side
@@ -258,6 +258,8 @@ def _landmarks(asked: Asked, marked: _Marked, still: _Still, messages: list[str]
     except ModelError as error:
         reasons = dict.fromkeys(source.match.left_out.values())
         raise ModelError("; ".join([error.message, *reasons])) from None
+    if still.stands:
+        messages += check_standing(found.landmarks, source.recording.name, given=asked.static is not None)
     supposed = _supposed_legs(found, legs, marked.chosen)
     if supposed and not still.stands:
         raise ModelError(_no_legs(supposed, source, asked.static, legs))
