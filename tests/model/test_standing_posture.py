@@ -36,7 +36,7 @@ def test_who_stands_with_bent_legs(knee: float, thigh: float, said: str) -> None
 
 
 def test_who_sits_is_refused_as_standing_trial_only() -> None:
-    with pytest.raises(ModelError, match="nobody stands upright in chair.*straight knees"):
+    with pytest.raises(ModelError, match=r"nobody stands upright in chair.*straight knees"):
         check_standing(legs(95.0, 85.0), "chair", given=True)
     assert len(check_standing(legs(95.0, 85.0), "chair", given=False)) == 1
 

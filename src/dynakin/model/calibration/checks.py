@@ -64,7 +64,9 @@ def check_standing(landmarks: Mapping[str, Array], name: str, *, given: bool) ->
     """
     bent: dict[str, float] = {}
     for side, word in (("r", "right"), ("l", "left")):
-        hip, knee, ankle = (np.asarray(landmarks.get(f"{joint}_{side}", _NOWHERE)) for joint in ("hip", "knee", "ankle"))
+        hip, knee, ankle = (
+            np.asarray(landmarks.get(f"{joint}_{side}", _NOWHERE)) for joint in ("hip", "knee", "ankle")
+        )
         bent[f"{word} knee"] = _angle_deg(hip - knee, knee - ankle)
         bent[f"{word} thigh"] = _angle_deg(hip - knee, np.array([0.0, 1.0, 0.0]))
     worst = max(bent, key=lambda part: np.nan_to_num(bent[part]))

@@ -33,6 +33,8 @@ _LINE_FRAMES, _LINE_S, _LINE_M = 8, 0.08, 0.01
 """How long and how far such a line is at least."""
 _MOST_REPEATED = 0.2
 """Part of the frames that may repeat others: more is another rate, written as this one."""
+_FAR, _FAR_M = 10.0, 2.0
+"""Median deviations of all markers' coordinates, and metres, from their median beyond which nobody is."""
 _MOSTLY = 2.0
 """How many times as often as any other of its name a marker is seen to be the one that is meant."""
 
@@ -144,6 +146,8 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
     if origin.any():
         who = ", ".join(name for name, hit in zip(names, origin.any(axis=0), strict=True) if hit)
         notes.append(f"Markers at exactly 0, 0, 0 taken as missing ({int(origin.sum())} samples: {who}).")
+    markers, said = _without_placeholders(names, markers)
+    notes += said
     partial = np.isnan(markers).any(axis=2)
     markers[origin | partial] = np.nan
     rate = rate_of(time)
@@ -180,6 +184,34 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
         empty = np.flatnonzero(missing.all(axis=1))
         notes.append(f"{len(empty)} frames have no marker at all, the first is frame {empty[0] + 1}.")
     return markers, notes
+
+
+def _without_placeholders(names: tuple[str, ...], markers: Array) -> tuple[Array, list[str]]:
+    """Without what a program wrote for a missing marker (-9999.99 thrice, say): a place far outside the volume, the
+    same to the last digit in several samples of markers that are elsewhere else, or in all three coordinates."""
+    flat = markers.reshape(-1, 3)
+    known = np.isfinite(flat).all(axis=1)
+    if np.count_nonzero(known) < 2:
+        return markers, []
+    middle = np.median(flat[known], axis=0)
+    spread = np.median(np.abs(flat[known] - middle), axis=0)
+    far = known.copy()
+    far[known] = (np.abs(flat[known] - middle) > _FAR * spread + _FAR_M).any(axis=1)
+    if not far.any():
+        return markers, []
+    places, which, counts = np.unique(flat[far], axis=0, return_inverse=True, return_counts=True)
+    mostly = far.reshape(markers.shape[:2]).mean(axis=0) < 1.0
+    alike = (places == places[:, :1]).all(axis=1)
+    held = (counts > 1)[which.ravel()] & np.broadcast_to(mostly, markers.shape[:2]).ravel()[far]
+    hit = np.zeros(len(flat), dtype=bool)
+    hit[far] = held | alike[which.ravel()]
+    if not hit.any():
+        return markers, []
+    found = hit.reshape(markers.shape[:2])
+    who = ", ".join(name for name, own in zip(names, found.any(axis=0), strict=True) if own)
+    where = ", ".join(f"{value:.6g}" for value in flat[np.argmax(hit)])
+    note = f"Markers at exactly {where} m, far outside the volume, taken as missing ({int(hit.sum())} samples: {who})."
+    return np.where(found[:, :, None], np.nan, markers), [note]
 
 
 def _repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:

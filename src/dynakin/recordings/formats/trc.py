@@ -35,7 +35,7 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
         RecordingError: not a TRC, wrong column count (with line, found and expected), time that does not increase.
     """
     path = Path(path)
-    lines = read_lines(path)
+    lines = _tabbed(read_lines(path))
     top = next((k for k, line in enumerate(lines[:40]) if _is_names_row(line)), None)
     if top is None:
         raise RecordingError(f"{path}: is not a TRC file, found no line that starts with 'Frame#' and 'Time'")
@@ -67,6 +67,15 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
         length_unit=unit,
         notes=tuple(notes + unit_notes + doubled_notes + marker_notes),
     )
+
+
+def _tabbed(lines: list[str]) -> list[str]:
+    """The lines parted by tabs, of a file that a spreadsheet parted by semicolons or commas."""
+    for mark in ";,":
+        head = next((line for line in lines[:40] if _is_names_row(line.replace(mark, "\t"))), None)
+        if head is not None and "\t" not in head:
+            return [line.replace(mark, "\t") for line in lines]
+    return lines
 
 
 def _is_names_row(line: str) -> bool:

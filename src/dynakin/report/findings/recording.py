@@ -11,7 +11,16 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import marker_sites
 from dynakin.results.measures.sources import out_of_sight
 from dynakin.results.naming import listed, sentence, words
-from dynakin.results.records import LOW_PASSED, MISPLACED, NEVER_FLAT, NOT_UPRIGHT, REFUSED, WARNING, doubts_mass, warnings_of
+from dynakin.results.records import (
+    LOW_PASSED,
+    MISPLACED,
+    NEVER_FLAT,
+    NOT_UPRIGHT,
+    REFUSED,
+    WARNING,
+    doubts_mass,
+    warnings_of,
+)
 
 # Words of warnings that a finding of their own says, or that are no doubt of the estimate.
 _SAID_ELSEWHERE = (
