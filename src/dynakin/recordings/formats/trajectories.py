@@ -259,7 +259,7 @@ def _left_out(markers: Array, time: Array) -> list[str]:
     more = f", and at {len(jumps) - 4} more places" if len(jumps) > 4 else ""
     return [
         "Warning: frames were left out and the times numbered on, because all markers move as far as in several frames "
-        f"between frames {', '.join(listed)}{more}. Later times are wrong against the plates; export the recording "
+        f"between frames {', '.join(listed)}{more}. Later times are wrong against the forces; export the recording "
         "with every frame."
     ]
 
