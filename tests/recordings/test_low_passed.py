@@ -45,6 +45,14 @@ def test_who_stands_has_nothing_to_lose() -> None:
     assert found_low_pass(replace(still, markers=still.markers + noise)) is None
 
 
+def test_frames_without_any_marker_are_passed_over(gait: Recording) -> None:
+    found = low_passed(gait, 6.0)
+    markers = found.markers.copy()
+    markers[100:105] = np.nan
+    assert found_low_pass(replace(found, markers=markers)) is not None
+    assert found_low_pass(replace(found, markers=np.full_like(markers, np.nan))) is None
+
+
 def test_too_short_says_nothing(gait: Recording) -> None:
     assert found_low_pass(low_passed(gait, 6.0).window(1.0, 1.4)) is None
 

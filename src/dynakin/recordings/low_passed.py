@@ -104,6 +104,8 @@ def _spectrum(recording: Recording) -> tuple[Array, Array]:
     for start in starts:
         part = markers[start : start + size]
         seen = np.isfinite(part).all(axis=(0, 2))
+        if not seen.any():
+            continue
         flat = part[:, seen].reshape(size, -1)
         flat = (flat - basis @ (basis.T @ flat)) * window[:, None]
         power = np.square(np.abs(np.fft.rfft(flat, axis=0))).reshape(-1, int(seen.sum()), 3).mean(axis=2)
