@@ -106,6 +106,8 @@ def test_settings_and_a_recording_that_was_read_give_the_same(
         dynakin.run(recording, plate_filter_hz=20.0, **KEYS)
     with pytest.raises(ConfigError, match="mass_kg is given next to subject"):
         dynakin.run(recording, subject=subject, **KEYS)
+    with pytest.raises(ConfigError, match=r"subject is \{'mass_kg': 60.0\}, expected a dynakin.Subject"):
+        dynakin.run(recording, subject={"mass_kg": 60.0}, model="squat7")  # type: ignore[arg-type]
     with pytest.raises(ConfigError, match="unknown key 'modle'"):
         dynakin.run(recording, modle="squat7", **KEYS)
 
@@ -125,6 +127,9 @@ def test_a_result_as_a_researcher_takes_it(from_python: dynakin.Result) -> None:
             ConfigError, match=f"{quantity} has the dimensions {dimensions}, .* as coordinates, .*speeds"
         ):
             from_python.to_dataframe(quantity)
+    for wrong in (None, 3):
+        with pytest.raises(ConfigError, match=f"no quantity {wrong}, expected one of coordinates"):
+            from_python.to_dataframe(wrong)  # type: ignore[arg-type]
     assert from_python.events == estimate.events and from_python.failures.found == []
     assert from_python.metrics()["identifiability"]["advice"] == list(from_python.observability.advice)
     assert from_python.model.mass_kg == 70.0

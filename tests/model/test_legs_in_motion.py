@@ -22,6 +22,7 @@ from dynakin.report.insights import insights
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.records import NEVER_FLAT
 from dynakin.settings.noise import Noise
+from dynakin.settings.subject import Subject
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
 
@@ -194,3 +195,14 @@ def test_a_foot_that_is_never_seen_flat_stands_as_an_adults_whose_heel_and_toes_
         error = found.data["coordinates"].sel(coordinate=name).values - truth
         assert abs(np.degrees(np.median(error))) < 5.0
     assert any(NEVER_FLAT in text and "may be 5 deg off" in text for text in found.messages)
+
+
+def test_a_recording_of_one_side_is_told_which_marker_lacks() -> None:
+    recording = simulate("fullbody", "gait", 5, 2.5, markers="opencap").recording
+    own = [k for k, name in enumerate(recording.marker_names) if name[:2] in ("r_", "r.", "R_")]
+    own = [k for k in own if "mknee" not in recording.marker_names[k]]
+    names = tuple(recording.marker_names[k] for k in own)
+    right = replace(recording, marker_names=names, markers=recording.markers[:, own])
+    definition = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75), markers="opencap")
+    with pytest.raises(ModelError, match=r"right knee is not known without r_mknee or L\.ASIS"):
+        definition.calibrate(right)

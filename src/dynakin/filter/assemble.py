@@ -19,9 +19,11 @@ from dynakin.filter.noise import prior_factor, unseen_limit
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import hidden_segments, with_sources
 from dynakin.filter.systematic import Systematic
+from dynakin.filter.taken import with_taken
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import ON_PLATE, UNMEASURED
+from dynakin.recordings.low_passed import LowPass
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import nearly_singular
@@ -49,6 +51,7 @@ def assemble(
     feet: ContactLoads | None = None,
     undeclared: npt.NDArray[np.bool_] | None = None,
     systematic: Systematic | None = None,
+    low_pass: LowPass | None = None,
 ) -> Estimate:
     """Label what `Filter.run` returned and keep what is needed to judge it.
 
@@ -63,6 +66,7 @@ def assemble(
         feet: the wrenches that the moments were made with, None where there were none.
         undeclared: (T,) frames in which something bears the person that no plate measures.
         systematic: what is added to the filter's deviations of angles, speeds, accelerations and moments.
+        low_pass: what the markers went through before they were given.
     """
     whole = _dataset(arrays, model, initial, recording, measured, feet)
     beyond, reasons = None, list(config.get("ground_reasons", ()))
@@ -116,6 +120,9 @@ def assemble(
     events = events_of(whole, parameters, initial, unseen_limit(used))  # by what the filter itself believes
     if systematic is not None:
         data = systematic.added_over_time(data, late=bool(config.get("lag_s")))
+    if low_pass is not None:
+        data, said = with_taken(data, low_pass, systematic)
+        notes = [*notes, said]
     estimate = Estimate(
         data=data,
         parameters=parameters,

@@ -27,6 +27,7 @@ from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject, with_identified
 from dynakin.progress import Progress
 from dynakin.recordings.limits import rate_problem
+from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.tracking import without_lost
@@ -302,7 +303,7 @@ class Estimator:
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(
             arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances,
-            tracker.noise, on_feet, ready.undeclared(on_feet), tracker.systematic,
+            tracker.noise, on_feet, ready.undeclared(on_feet), tracker.systematic, found_low_pass(recording),
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)
 

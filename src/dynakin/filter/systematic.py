@@ -199,10 +199,7 @@ class Systematic:
         # how inertia hangs together is known at the end alone, how well it is known in each frame
         sd = values_of(data, "state_sd")[:, self._inertia]
         together = _correlation(data["final_covariance"].values[np.ix_(self._inertia, self._inertia)])
-        wrench, segments = np.zeros((len(time), 0, 6)), []
-        if "foot_wrench" in data:
-            wrench = np.nan_to_num(values_of(data, "foot_wrench"))
-            segments = [str(name) for name in data["foot_segment"].values]
+        wrench, segments = _contacts(data)
         chosen = _sampled(time)
         used = in_use(np.isfinite(values_of(data, "markers_measured")).any(axis=2), time)
         each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments, used[k]) for k in chosen]
@@ -211,15 +208,32 @@ class Systematic:
             for kind in (*KINDS, "inertia")
         }
 
+    def moments_moved(self, data: xr.Dataset, moved: Sequence[Array]) -> Array:
+        """(T, C): what moments change by where coordinates, speeds and accelerations (T, C) are others by ``moved`` and
+        the contacts' wrenches stay; NaN where the state is not a number."""
+        states, (wrench, segments) = states_of(data), _contacts(data)
+        change = np.hstack([values[:, self._free] for values in moved])
+        K = change.shape[1]
+        found = np.full((len(states), self._count), np.nan)
+        for k in np.flatnonzero(np.isfinite(states[:, :K]).all(axis=1)):
+            T = _core.moment_jacobian(self._model, states[k], self._external(wrench[k], segments))
+            found[k] = T[: self._count, :K] @ change[k]
+        return found
+
+    def _external(self, wrench: Array, segments: Sequence[str]) -> Array:
+        """(S, 6) by segment of the model: wrenches (F, 6) of contacts on these."""
+        external = np.zeros((len(self._segments), 6))
+        for name, values in zip(segments, wrench, strict=True):
+            external[self._segments[name]] += values
+        return external
+
     def _at(self, x: Array, inertia: Array, wrench: Array, segments: Sequence[str], used: Flags | None = None) -> Parts:
         """`parts` of a state (n,), and "inertia" of this covariance (I, I), with wrenches (F, 6) of contacts on these
         segments."""
         K = len(self._free)
         if not np.isfinite(x[: 3 * K]).all():
             return {kind: {b: np.full(self._count, np.nan) for b in BLOCKS} for kind in (*KINDS, "inertia")}
-        external = np.zeros((len(self._segments), 6))
-        for name, values in zip(segments, wrench, strict=True):
-            external[self._segments[name]] += values
+        external = self._external(wrench, segments)
         still = np.zeros(K)
         by_inertia = self._labelled(still, still, still, self._by_inertia(x, inertia, external))
         return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external, used) | {"inertia": by_inertia}
@@ -291,6 +305,13 @@ class Systematic:
 def states_of(data: xr.Dataset) -> Array:
     """(T, n) of a recording."""
     return values_of(data, "state")
+
+
+def _contacts(data: xr.Dataset) -> tuple[Array, list[str]]:
+    """Wrenches (T, F, 6) of the contacts and their segments; none where the model has no contacts."""
+    if "foot_wrench" not in data:
+        return np.zeros((len(data["time"]), 0, 6)), []
+    return np.nan_to_num(values_of(data, "foot_wrench")), [str(name) for name in data["foot_segment"].values]
 
 
 def any_off_plates(data: xr.Dataset, feet: int) -> bool:

@@ -75,9 +75,8 @@ class Result:
         """
         known = [str(name) for name in self.estimate.data]
         if quantity not in known:
-            raise ConfigError(
-                f"to_dataframe: no quantity {quantity!r}{nearest(quantity, known)}, expected one of {', '.join(known)}"
-            )
+            near = nearest(quantity, known) if isinstance(quantity, str) else ""
+            raise ConfigError(f"to_dataframe: no quantity {quantity!r}{near}, expected one of {', '.join(known)}")
         data = self.estimate.data[quantity]
         if not _is_table(data):
             tables = [name for name in known if _is_table(self.estimate.data[name])]

@@ -68,6 +68,11 @@ def run(
     """
     given = settings | {"model": None if model is None else str(model), "forces": forces, "output": output}
     if subject is not None:
+        if not isinstance(subject, Subject):
+            raise ConfigError(
+                f"run: subject is {subject!r}, expected a dynakin.Subject, such as "
+                "dynakin.Subject(mass_kg=70.0, height_m=1.75)"
+            )
         if twice := [key for key in ("mass_kg", "height_m", "sex") if settings.get(key) is not None]:
             raise ConfigError(f"run: {twice[0]} is given next to subject, expected it in one of them")
         given |= {"mass_kg": subject.mass_kg, "height_m": subject.height_m, "sex": subject.sex}

@@ -34,6 +34,8 @@ def rate_problem(time: Array) -> str | None:
     units = {"milliseconds": 1e-3, "microseconds": 1e-6}
     fits = [unit for unit, s in units.items() if SLOWEST_HZ * s * step <= 1.0 <= FASTEST_HZ * s * step]
     hint = f"; they seem to be in {fits[0]}, expected seconds" if step > 1.0 and fits else ""
+    if (time == np.rint(time)).all() and step == 1.0:
+        hint = "; they seem to count frames, expected seconds (frames over the rate of the cameras)"
     return (
         f"found times that are {step:.4g} s apart ({1.0 / step:.4g} Hz), expected {SLOWEST_HZ:g} to "
         f"{FASTEST_HZ:g} Hz{hint}"

@@ -15,6 +15,7 @@ from dynakin.recordings.formats.csv import read_csv, read_csv_table
 from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table, read_table
+from dynakin.recordings.formats.textfile import first_cell, refuse_export
 from dynakin.recordings.formats.trc import read_trc
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
@@ -36,6 +37,7 @@ def extensions(readers: Iterable[str] = READERS) -> str:
     return f"{', '.join(most)} or {last}" if most else last
 
 
+_TABLES = (".tsv", ".txt")  # of camera systems, whose first cell says whose
 _ENOUGH = 5  # markers that show how large a person is
 _SPAN_M = (0.02, 50.0)
 
@@ -69,6 +71,8 @@ def read(
     reader = READERS.get(path.suffix.casefold())
     require_file(path)
     if reader is None:
+        if path.suffix.casefold() in _TABLES:
+            refuse_export(first_cell(path), path)
         hint = "; a table of ground forces goes with a recording" if path.suffix.casefold() in FORCE_READERS else ""
         raise RecordingError(
             f"{path}: found extension {path.suffix!r}, expected a recording as {extensions(READERS)}{hint}"

@@ -18,6 +18,7 @@ from dynakin.recordings.signals import AnalogChannel, Event
 
 Array = npt.NDArray[np.float64]
 
+_FEW = 9  # frames, over which the scatter of time stamps is averaged
 _PERSON = 0.25  # of the markers that are usually seen: fewer are what a person leaves behind, or reflections
 
 
@@ -53,15 +54,24 @@ class Plate:
 
 
 def rate_of(time: Array) -> float:
-    """Rate of times (T,) s in Hz: the mean one of an even grid, whose steps files round, else that of the median step;
-    NaN of fewer than two."""
+    """Rate of times (T,) s in Hz: the mean one where they lie about an even grid, by which stamps scatter and files
+    round; that of the median step where frames are missing; NaN of fewer than two."""
     if len(time) < 2:
         return float("nan")
     step = float(np.median(np.diff(time)))
     even = np.linspace(time[0], time[-1], len(time))
     if np.abs(time - even).max() < 0.1 * step:
         return float((len(time) - 1) / (time[-1] - time[0]))
-    return 1.0 / step
+    k = np.arange(len(time)) - 0.5 * (len(time) - 1)
+    slope = float(k @ time / (k @ k))
+    return 1.0 / slope if scatters(time - time.mean() - slope * k, slope) else 1.0 / step
+
+
+def scatters(off: Array, step: float) -> bool:
+    """Whether times that lie off an even grid by (T,) s do so at random: each less than half a step, and on average
+    over a few frames much less, as they do not where a frame is missing."""
+    mean = np.convolve(off, np.full(_FEW, 1.0 / _FEW), mode="valid") if len(off) >= _FEW else off
+    return bool(np.abs(off).max() < 0.5 * step and np.abs(mean).max() < 0.3 * step)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
+import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import Trial
@@ -11,6 +14,16 @@ from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.inertia import RigidBody
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
+from dynakin.results.records import NOT_UPRIGHT
+
+Array = npt.NDArray[np.float64]
+
+BENT_DEG = 30.0
+"""Of a knee, or of a thigh against the vertical, from which on a standing trial is doubted: in the standing trials that
+we have, and simulated ones, 1 to 17; with one leg ahead or lifted 25; a deep squat and sitting 74 to 99."""
+SITS_DEG = 75.0
+"""Of both knees, beyond which nobody stands: a severe crouch gait has 60."""
+_NOWHERE = (np.nan, np.nan, np.nan)
 
 
 def refuse_moving_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder) -> None:
@@ -37,6 +50,40 @@ def refuse_moving_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder)
                     "mm): walking and "
                     "other movements of the feet need a model that is not rooted there"
                 )
+
+
+def check_standing(landmarks: Mapping[str, Array], name: str, *, given: bool) -> list[str]:
+    """A warning where somebody who holds still does so with bent legs: a squat, or sitting.
+
+    Args:
+        landmarks: of the frames on which places are measured, Y up. name: of the recording. given: as the standing
+            trial.
+
+    Raises:
+        ModelError: given as the standing trial, of somebody who cannot be standing.
+    """
+    bent: dict[str, float] = {}
+    for side, word in (("r", "right"), ("l", "left")):
+        hip, knee, ankle = (
+            np.asarray(landmarks.get(f"{joint}_{side}", _NOWHERE)) for joint in ("hip", "knee", "ankle")
+        )
+        bent[f"{word} knee"] = _angle_deg(hip - knee, knee - ankle)
+        bent[f"{word} thigh"] = _angle_deg(hip - knee, np.array([0.0, 1.0, 0.0]))
+    worst = max(bent, key=lambda part: np.nan_to_num(bent[part]))
+    if not bent[worst] > BENT_DEG:
+        return []
+    of = "against the vertical" if worst.endswith("thigh") else "bent"
+    said = f"{NOT_UPRIGHT} {name}: the {worst} is {bent[worst]:.0f} deg {of}"
+    if given and min(bent["right knee"], bent["left knee"]) > SITS_DEG:
+        raise ModelError(f"{said}, expected a standing trial of the person upright with straight knees (--static)")
+    return [
+        f"Warning: {said}, and places of markers measured there are off where the legs are straight. Give a standing "
+        "trial of the person upright with straight knees (--static)."
+    ]
+
+
+def _angle_deg(a: Array, b: Array) -> float:
+    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
 
 
 def reach(model: ModelFile, name: str, geometry: Geometry, parts: list[PlacedPart]) -> float:

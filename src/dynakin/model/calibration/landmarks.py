@@ -118,6 +118,31 @@ class LandmarkFinder:
                 return self.match.absent(source)
         raise AssertionError(f"landmark {name} is there")  # callers ask only for what is lacking
 
+    def touched(self, name: str, side: str) -> bool:
+        """Whether the recording has a marker of its own for a landmark, which alone may not be enough for it."""
+        recipes = self._recipes.get(name, ())
+        own = {source for recipe in recipes for source in recipe.inputs if source not in recipe.across}
+        return any(self._key(source, side) is not None for source in own - self._recipes.keys())
+
+    def lacking(self, name: str, side: str) -> list[frozenset[str]]:
+        """The fewest markers, by their first names in the set, with which a landmark would be known; each way to it."""
+        if name not in self._recipes:
+            if self._key(name, side) is not None:
+                return [frozenset()]
+            marker = self.match.marker_set.marker(name)
+            return [frozenset([(marker.centre or (marker.right if side == "right" else marker.left))[0]])]
+        if self.recipe(name, side) is not None:
+            return [frozenset()]
+        ways: list[frozenset[str]] = []
+        for recipe in self._recipes[name]:
+            own = [frozenset[str]()]
+            for source in recipe.inputs:
+                for s in SIDES if source in recipe.across else _sides(recipe, side):
+                    own = [a | b for a in own for b in self.lacking(source, s)]
+            ways += own
+        fewest = min(len(way) for way in ways)
+        return list(dict.fromkeys(way for way in ways if len(way) == fewest))
+
     def markers_of(self, name: str) -> set[MarkerKey]:
         """Every marker that the landmark's value depends on."""
         keys: set[MarkerKey] = set()

@@ -10,7 +10,14 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
-from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
+from dynakin.model.calibration.checks import (
+    check_masses,
+    check_standing,
+    fixed_lengths,
+    reach,
+    refuse_moving_origin,
+    report,
+)
 from dynakin.model.calibration.completion import Completed, completed
 from dynakin.model.calibration.flat_feet import flat_slopes, never_flat, usual_slopes
 from dynakin.model.calibration.frames import Trial, choose_side
@@ -258,9 +265,11 @@ def _landmarks(asked: Asked, marked: _Marked, still: _Still, messages: list[str]
     except ModelError as error:
         reasons = dict.fromkeys(source.match.left_out.values())
         raise ModelError("; ".join([error.message, *reasons])) from None
+    if still.stands:
+        messages += check_standing(found.landmarks, source.recording.name, given=asked.static is not None)
     supposed = _supposed_legs(found, legs, marked.chosen)
     if supposed and not still.stands:
-        raise ModelError(_no_legs(supposed, source, asked.static, legs))
+        raise ModelError(_no_legs(supposed, source, asked.static, legs, finder))
     unmarked = tuple(name for name in LEG_JOINTS if name in (*legs.joints, *supposed))
     if unmarked:
         joints = listed([words(name) for name in sorted(unmarked)])
@@ -294,7 +303,9 @@ def _supposed_legs(found: Completed, legs: Legs, chosen: Sequence[Candidate]) ->
     return [n for n in LEG_JOINTS if n not in legs.landmarks and n in found.added and found.added[n] in marked]
 
 
-def _no_legs(supposed: Sequence[str], source: Trial, static: Recording | None, legs: Legs) -> str:
+def _no_legs(
+    supposed: Sequence[str], source: Trial, static: Recording | None, legs: Legs, finder: LandmarkFinder
+) -> str:
     """Laid out as those of an adult who stands, they are tens of degrees off where nobody does."""
     expected = "a standing trial with markers on knees and ankles (--static)"
     if static is not None:
@@ -305,7 +316,21 @@ def _no_legs(supposed: Sequence[str], source: Trial, static: Recording | None, l
     whys = (why.removesuffix(f": {CORRECT}") for why in on_legs)
     if reasons := "; ".join(dict.fromkeys(whys)):
         return f"{match.where}: {said}, because markers are left out: {reasons}; expected the labels corrected."
+    if short := _one_short(supposed, finder):
+        return f"{match.where}: {short}, and nobody stands still in it; expected it, or {expected}."
     return " ".join([f"{source.match.where}: {said}; expected {expected}.", *legs.failed])
+
+
+def _one_short(supposed: Sequence[str], finder: LandmarkFinder) -> str:
+    """Which marker each of these joints lacks, where it is one marker of any of them."""
+    said = []
+    for name in supposed:
+        joint, side = name.split("_")[0], "right" if name.endswith("_r") else "left"
+        ways = finder.lacking(joint, side)
+        if {len(way) for way in ways} != {1} or not finder.touched(joint, side):
+            return ""
+        said.append(f"{words(name)} is not known without {' or '.join(dict.fromkeys(m for way in ways for m in way))}")
+    return " and ".join(said)
 
 
 def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: npt.NDArray[np.intp]) -> Trial:

@@ -14,6 +14,7 @@ cell is a missing value, a line that begins with ``#`` a remark::
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -23,7 +24,15 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table
-from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows, trial_name
+from dynakin.recordings.formats.textfile import (
+    check_unique,
+    read_lines,
+    refuse_export,
+    split_cells,
+    timed_rows,
+    trial_name,
+)
+from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.formats.trajectories import clean_markers, length_unit, timing_notes
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.resampling import ReadOptions
@@ -49,6 +58,7 @@ def read_csv_table(path: Path) -> Table:
     names = split_cells(head, separator)
     while len(names) > 1 and not names[-1]:
         del names[-1]
+    refuse_export(names[0], path)
     if not _TIME.match(names[0]):
         raise RecordingError(
             f"{path}, line {first}: found column {names[0]!r} first, expected 'time', then NAME_x, NAME_y, NAME_z"
@@ -70,6 +80,8 @@ def read_csv(path: Path, options: ReadOptions | None = None) -> Recording:
     forces = [name for name in table.names if parse_column(name)]
     rest = [name for name in table.names if name not in forces]
     names, raw = _markers(table, rest)
+    time, stamp_notes = settled_times(table.time, raw)
+    table = replace(table, time=time, notes=(*table.notes, *stamp_notes))
     factor, unit, unit_notes = (1.0, "m", []) if forces else _unit(raw)
     markers, notes = clean_markers(names, raw * factor, table.time, table.path)
     recording = Recording(

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns
+from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, parse_column
 from dynakin.recordings.formats.mot import Table
+from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
-from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.recording import Array, Plate, Recording, rate_of
 from dynakin.recordings.resampling import ReadOptions, low_pass, resample, same_times
 
 _MIN_RATE_RATIO = 0.99
@@ -109,7 +110,11 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         RecordingError: the table is shorter than the markers or sampled more slowly; the message names both
             lengths and ranges.
     """
+    columns = [k for k, name in enumerate(table.names) if parse_column(name)]
+    time, stamps = settled_times(table.time, table.values[:, columns])
+    table = replace(table, time=time)
     plates, notes = plates_from_table(table)
+    notes += tuple(f"{table.path.name}: {text}" for text in stamps)
     if recording.plates:
         notes += (f"{table.path.name} replaces the {len(recording.plates)} plates of {recording.name}.",)
     untouched = same_times(table.time, recording.time)
@@ -128,7 +133,7 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
 def _check_cover(recording: Recording, table: Table) -> None:
     t, m = table.time, recording.time
     step = float(np.median(np.diff(m))) if len(m) > 1 else 0.0
-    rate = float(1 / np.median(np.diff(t))) if len(t) > 1 else 0.0
+    rate = rate_of(t) if len(t) > 1 else 0.0
     slow = len(m) > 1 and rate < _MIN_RATE_RATIO * recording.rate
     if slow or t[0] > m[0] + 0.5 * step or t[-1] < m[-1] - 0.5 * step:
         what = "are sampled more slowly than" if slow else "do not cover"
@@ -146,7 +151,7 @@ def _resampled(plate: Plate, table: Table, recording: Recording, options: ReadOp
             f"{table.path}: {plate.name} has no force at {table.time[row]:g} s, cannot be resampled or filtered"
         )
     if options.plate_filter_hz is not None:
-        rate = float(1 / np.median(np.diff(table.time)))
+        rate = rate_of(table.time)
         wrench = low_pass(wrench, rate, options.plate_filter_hz, causal=options.causal)
     wrench = resample(wrench, table.time, recording.time, causal=options.causal)
     threshold = UNLOADED_N if options.force_threshold_n is None else options.force_threshold_n

@@ -19,8 +19,29 @@ from dynakin.recordings.recording import Array
 _CONTROL = re.compile(r"[\x00-\x1f\x7f]+")
 # What programs write for a value that is missing
 _MISSING = ("", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-", "-nan(ind)", "nan(ind)", "-1.#ind", "1.#qnan")
+_NO_NUMBER = "-*."  # and any number of these
 _ROUGH = 0.1  # part of a step from which rounding of times is undone: `resampling.UNEVEN` would refuse it
 _ENOUGH = 10  # times that show a grid
+
+
+_EXPORTS = {
+    "format version": "a CSV of Motive",
+    "trajectories": "a CSV of Nexus",
+    "devices": "a CSV of Nexus",
+    "no_of_frames": "a TSV of QTM",
+}
+
+
+def first_cell(path: Path) -> str:
+    """Of a text file; "" where it has none."""
+    cells = split_cells(read_lines(path)[0])
+    return cells[0] if cells else ""
+
+
+def refuse_export(first_cell: str, path: Path) -> None:
+    """Raise RecordingError where a file begins as a camera system writes tables that no reader takes."""
+    if (what := _EXPORTS.get(first_cell.casefold())) is not None:
+        raise RecordingError(f"{path}: is {what}, expected the same trial exported as C3D (or TRC)")
 
 
 def trial_name(path: Path) -> str:
@@ -101,7 +122,7 @@ def parse_row(cells: Sequence[str], names: Sequence[str], path: Path, line: int)
     row = []
     for cell, name in zip(cells, names, strict=False):
         try:
-            value = np.nan if cell.casefold() in _MISSING else float(cell)
+            value = np.nan if cell.casefold() in _MISSING or not cell.strip(_NO_NUMBER) else float(cell)
             if np.isinf(value):
                 raise ValueError
             row.append(value)

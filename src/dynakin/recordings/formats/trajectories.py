@@ -33,6 +33,12 @@ _LINE_FRAMES, _LINE_S, _LINE_M = 8, 0.08, 0.01
 """How long and how far such a line is at least."""
 _MOST_REPEATED = 0.2
 """Part of the frames that may repeat others: more is another rate, written as this one."""
+_TWICE, _ALL_ALIKE = 1.6, 0.3
+"""Times as far as expected from which frames are missing between two, and part of that by which markers may differ: no
+recording of ours has more than 1.13 where somebody moves, and a frame that is taken out gives 1.97 to 2.06."""
+_ENOUGH = 5  # markers
+_FAR, _FAR_M = 10.0, 2.0
+"""Median deviations of all markers' coordinates, and metres, from their median beyond which nobody is."""
 _MOSTLY = 2.0
 """How many times as often as any other of its name a marker is seen to be the one that is meant."""
 
@@ -144,6 +150,8 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
     if origin.any():
         who = ", ".join(name for name, hit in zip(names, origin.any(axis=0), strict=True) if hit)
         notes.append(f"Markers at exactly 0, 0, 0 taken as missing ({int(origin.sum())} samples: {who}).")
+    markers, said = _without_placeholders(names, markers)
+    notes += said
     partial = np.isnan(markers).any(axis=2)
     markers[origin | partial] = np.nan
     rate = rate_of(time)
@@ -168,6 +176,7 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
             "samples)."
         )
         markers[lines] = np.nan
+    notes += _left_out(markers, time)
     missing: npt.NDArray[np.bool_] = (
         np.isnan(markers[:, :, 0]) if markers.size else np.zeros(markers.shape[:2], dtype=bool)
     )
@@ -180,6 +189,34 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
         empty = np.flatnonzero(missing.all(axis=1))
         notes.append(f"{len(empty)} frames have no marker at all, the first is frame {empty[0] + 1}.")
     return markers, notes
+
+
+def _without_placeholders(names: tuple[str, ...], markers: Array) -> tuple[Array, list[str]]:
+    """Without what a program wrote for a missing marker (-9999.99 thrice, say): a place far outside the volume, the
+    same to the last digit in several samples of markers that are elsewhere else, or in all three coordinates."""
+    flat = markers.reshape(-1, 3)
+    known = np.isfinite(flat).all(axis=1)
+    if np.count_nonzero(known) < 2:
+        return markers, []
+    middle = np.median(flat[known], axis=0)
+    spread = np.median(np.abs(flat[known] - middle), axis=0)
+    far: npt.NDArray[np.bool_] = np.array(known, dtype=bool)
+    far[known] = (np.abs(flat[known] - middle) > _FAR * spread + _FAR_M).any(axis=1)
+    if not far.any():
+        return markers, []
+    places, which, counts = np.unique(flat[far], axis=0, return_inverse=True, return_counts=True)
+    mostly = far.reshape(markers.shape[:2]).mean(axis=0) < 1.0
+    alike = (places == places[:, :1]).all(axis=1)
+    held = (counts > 1)[which.ravel()] & np.broadcast_to(mostly, markers.shape[:2]).ravel()[far]
+    hit = np.zeros(len(flat), dtype=bool)
+    hit[far] = held | alike[which.ravel()]
+    if not hit.any():
+        return markers, []
+    found = hit.reshape(markers.shape[:2])
+    who = ", ".join(name for name, own in zip(names, np.asarray(found.any(axis=0)), strict=True) if own)
+    where = ", ".join(f"{value:.6g}" for value in flat[np.argmax(hit)])
+    note = f"Markers at exactly {where} m, far outside the volume, taken as missing ({int(hit.sum())} samples: {who})."
+    return np.where(found[:, :, None], np.nan, markers), [note]
 
 
 def _repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
@@ -198,6 +235,33 @@ def _repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
     for first, end in runs(same):
         found[first:end] = first > 1 and end < len(step) and min(step[first - 1], step[end]) > least
     return found
+
+
+def _left_out(markers: Array, time: Array) -> list[str]:
+    """A warning of frames that were dropped and the times numbered on: all markers move between two frames as far as in
+    several, by a cubic through their steps before and after."""
+    if len(time) < 6:
+        return []
+    step = np.diff(markers, axis=0) / np.diff(time)[:, None, None]
+    expected = (4.0 * (step[1:-3] + step[3:-1]) - step[:-4] - step[4:]) / 6.0
+    found = step[2:-2]
+    both = np.isfinite(found) & np.isfinite(expected)
+    found, expected = np.where(both, found, 0.0), np.where(both, expected, 0.0)
+    seen = np.maximum(both.any(axis=2).sum(axis=1), 1)
+    size = np.square(expected).sum(axis=(1, 2))
+    times = (found * expected).sum(axis=(1, 2)) / np.maximum(size, 1e-12)
+    apart = np.sqrt(np.square(found - times[:, None, None] * expected).sum(axis=(1, 2)) / np.maximum(size, 1e-12))
+    moves = np.sqrt(size / seen) > _MOVES_M_S
+    jumps = np.flatnonzero(moves & (seen >= _ENOUGH) & (times > _TWICE) & (apart < _ALL_ALIKE * times))
+    if not len(jumps):
+        return []
+    listed = [f"{k + 3} and {k + 4} ({time[k + 2]:.3f} s, as in {times[k]:.0f})" for k in jumps[:4]]
+    more = f", and at {len(jumps) - 4} more places" if len(jumps) > 4 else ""
+    return [
+        "Warning: frames were left out and the times numbered on, because all markers move as far as in several frames "
+        f"between frames {', '.join(listed)}{more}. Later times are wrong against the forces; export the recording "
+        "with every frame."
+    ]
 
 
 def _smallest_step(places: Array) -> float:

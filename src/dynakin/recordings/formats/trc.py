@@ -20,6 +20,7 @@ from pathlib import Path
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows, trial_name
+from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.formats.trajectories import clean_markers, distinct_names, length_unit, timing_notes
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
@@ -34,7 +35,7 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
         RecordingError: not a TRC, wrong column count (with line, found and expected), time that does not increase.
     """
     path = Path(path)
-    lines = read_lines(path)
+    lines = _tabbed(read_lines(path))
     top = next((k for k, line in enumerate(lines[:40]) if _is_names_row(line)), None)
     if top is None:
         raise RecordingError(f"{path}: is not a TRC file, found no line that starts with 'Frame#' and 'Time'")
@@ -51,6 +52,8 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
     table, time, row_notes, time_notes = timed_rows(body, columns, path, empty=empty, time_at=1, rate=rate)
     raw = table[:, 2:].reshape(len(table), len(names), 3)
     factor, unit, unit_notes = length_unit(header.get("units", ""), raw)
+    time, stamp_notes = settled_times(time, raw, rate)
+    time_notes += stamp_notes
     notes = row_notes + _count_notes(header, len(table), len(names)) + time_notes + timing_notes(time, rate)
     names, markers, doubled_notes = distinct_names(names, raw * factor)
     check_unique(names, "marker", path)
@@ -64,6 +67,15 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
         length_unit=unit,
         notes=tuple(notes + unit_notes + doubled_notes + marker_notes),
     )
+
+
+def _tabbed(lines: list[str]) -> list[str]:
+    """The lines parted by tabs, of a file that a spreadsheet parted by semicolons or commas."""
+    for mark in ";,":
+        head = next((line for line in lines[:40] if _is_names_row(line.replace(mark, "\t"))), None)
+        if head is not None and "\t" not in head:
+            return [line.replace(mark, "\t") for line in lines]
+    return lines
 
 
 def _is_names_row(line: str) -> bool:

@@ -11,7 +11,16 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import marker_sites
 from dynakin.results.measures.sources import out_of_sight
 from dynakin.results.naming import listed, sentence, words
-from dynakin.results.records import MISPLACED, NEVER_FLAT, REFUSED, WARNING, doubts_mass, warnings_of
+from dynakin.results.records import (
+    LOW_PASSED,
+    MISPLACED,
+    NEVER_FLAT,
+    NOT_UPRIGHT,
+    REFUSED,
+    WARNING,
+    doubts_mass,
+    warnings_of,
+)
 
 # Words of warnings that a finding of their own says, or that are no doubt of the estimate.
 _SAID_ELSEWHERE = (
@@ -37,6 +46,8 @@ ADVICE = {
     "scaling": "Scale the model to the person again, by a standing trial, or run without --model: fullbody measures "
     "its own.",
     "ankles": "Give a standing trial (--static), or take these ankles' angles by their changes alone.",
+    "upright": "Record the person standing upright with straight knees, and give that (--static).",
+    "low-passed": "Export the markers without a filter (raw), and run them; of these use angles of slow movements.",
     "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
 }
 
@@ -77,6 +88,8 @@ def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
         ("Subject", "subject", lambda text: text.startswith(_SUBJECT)),
         ("Model scaling", "scaling", lambda text: text.startswith(MISPLACED)),
         ("Ankle angles", "ankles", lambda text: text.startswith(NEVER_FLAT)),
+        ("Standing posture", "upright", lambda text: text.startswith(NOT_UPRIGHT)),
+        ("Low-passed markers", "low-passed", lambda text: text.startswith(LOW_PASSED)),
         ("Force plates", "plates", lambda text: "plate" in text),
         ("Recording", "recording", lambda text: True),
     ):

@@ -1,0 +1,58 @@
+"""A standing trial that is a squat is refused, one with bent knees warned of, a good one taken."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dynakin.errors import ModelError
+from dynakin.model.calibration.checks import check_standing
+from dynakin.model.definition import load_model
+from dynakin.recordings.recording import Recording
+from dynakin.results.records import NOT_UPRIGHT, warnings_of
+from dynakin.settings.subject import Subject
+from dynakin.simulation.trial import simulate
+
+
+def legs(knee_deg: float, thigh_deg: float) -> dict[str, np.ndarray]:
+    """Both alike."""
+    t, k = np.radians([thigh_deg, thigh_deg - knee_deg])
+    knee = -0.4 * np.array([-np.sin(t), np.cos(t), 0.0])
+    ankle = knee - 0.4 * np.array([-np.sin(k), np.cos(k), 0.0])
+    return {f"{n}_{s}": p for s in "rl" for n, p in (("hip", np.zeros(3)), ("knee", knee), ("ankle", ankle))}
+
+
+@pytest.mark.parametrize(("knee", "thigh"), [(0.0, 0.0), (17.0, 10.0), (25.0, 21.0)])
+def test_who_stands(knee: float, thigh: float) -> None:
+    assert check_standing(legs(knee, thigh), "static", given=True) == []
+
+
+@pytest.mark.parametrize(("knee", "thigh", "said"), [(45.0, 22.0, "knee is 45 deg bent"), (20.0, 40.0, "thigh is 40")])
+def test_who_stands_with_bent_legs(knee: float, thigh: float, said: str) -> None:
+    (text,) = check_standing(legs(knee, thigh), "static", given=True)
+    assert text.startswith(f"Warning: {NOT_UPRIGHT} static") and said in text and text.count("--static") == 1
+
+
+def test_who_sits_is_refused_as_standing_trial_only() -> None:
+    with pytest.raises(ModelError, match=r"nobody stands upright in chair.*straight knees"):
+        check_standing(legs(95.0, 85.0), "chair", given=True)
+    assert len(check_standing(legs(95.0, 85.0), "chair", given=False)) == 1
+
+
+def held(recording: Recording, frame: int) -> Recording:
+    """A second in this posture."""
+    noise = 2e-4 * np.random.default_rng(0).normal(size=(100, *recording.markers.shape[1:]))
+    posture = np.repeat(recording.markers[frame : frame + 1], 100, axis=0) + noise
+    return replace(recording, time=np.arange(100) / 100.0, markers=posture, plates=(), name="held")
+
+
+def test_a_squat_is_no_standing_trial() -> None:
+    squat = simulate("fullbody", "squat", 4, 6.0, markers="opencap").recording
+    definition = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"), markers="opencap")
+    pelvis = squat.marker("r.ASIS")[:, 1]
+    with pytest.raises(ModelError, match="nobody stands upright in held"):
+        definition.calibrate(squat, static=held(squat, int(np.argmin(pelvis))))
+    upright = definition.calibrate(squat, static=held(squat, 20))
+    assert not [text for text in warnings_of(upright.messages) if NOT_UPRIGHT in text]
