@@ -127,6 +127,24 @@ def test_a_quarter_turn_is_named(data_dir: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda plate: replace(plate, cop=1000.0 * plate.cop), "beyond the nearest marker"),
+        (lambda plate: replace(plate, cop=plate.cop + [0.0, 0.0, 0.7]), "away from the nearest foot"),
+        (lambda plate: replace(plate, force=plate.force / 63.3), "carry no load"),
+    ],
+)
+def test_what_is_wrong_with_plates_names_the_file_of_the_forces(
+    data_dir: Path, change: Callable[[Plate], Plate], said: str
+) -> None:
+    """It was the file of the markers that was named."""
+    folder = data_dir / "opencap_subject4"
+    walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    with pytest.raises(RecordingError, match=f"^[^ ]*walking1_grf.mot: .*{said}"):
+        person().prepare(walk.with_plates(tuple(change(plate) for plate in walk.plates)))
+
+
+@pytest.mark.parametrize(
     ("sign", "said"), [(-1.0, "are exchanged. "), (1.0, "are exchanged and point the other way. ")]
 )
 def test_horizontal_forces_that_are_exchanged_are_named(sign: float, said: str) -> None:

@@ -116,12 +116,11 @@ def known_ground(
     mass = None if initial.feet else initial.weighed_kg
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads)
     if check.refusal:
-        raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+        raise RecordingError(f"{recording.plates_file}: {check.refusal}")
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
         if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
-            source = recording.read_with.get("forces") or recording.path or recording.name
-            raise RecordingError(f"{source}: {wrong}")
+            raise RecordingError(f"{recording.plates_file}: {wrong}")
         delay = None if in_step else plates_delay(needed, np.where(loads.total_known[:, None], wrench[:, :3], np.nan))
         if delay is not None:
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
