@@ -18,6 +18,7 @@ from dynakin.filter.parameters import DELAY_UNSEEN_S, parameters_of
 from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.trial import simulate as simulate_anew
+from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.held_out import measured_wrench
 
 simulate = cache(simulate_anew)
@@ -160,6 +161,32 @@ def test_horizontal_forces_that_are_exchanged_are_named(sign: float, said: str) 
 
     with pytest.raises(RecordingError, match=f"does not fit the motion: .* if the two horizontal forces {said}"):
         person().prepare(with_forces(walk, change))
+
+
+WEIGHT = 70.0 * GRAVITY_M_S2
+
+
+@pytest.mark.parametrize(
+    ("one", "unit"),
+    [
+        (0.01 * WEIGHT, "% of the body weight"),
+        (WEIGHT, "body weights"),
+        (70.0, "N per kg of body mass"),
+        (4.448, "pounds of force"),
+        (GRAVITY_M_S2, "kg of force"),
+    ],
+)
+def test_another_unit_of_the_forces_of_a_walk_is_refused_and_named(one: float, unit: str) -> None:
+    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    with pytest.raises(RecordingError, match=f"probably in {unit}: convert them to N in the file"):
+        person().prepare(with_forces(walk, lambda force: force / one))
+
+
+def test_another_unit_of_the_forces_of_a_squat_is_named() -> None:
+    """It is no reason to refuse: who sits all the time bears as little on the feet."""
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    ready = person().prepare(with_forces(squat, lambda force: 100.0 / WEIGHT * force))
+    assert any("or the forces are in % of the body weight, not N" in text for text in ready.messages)
 
 
 def test_who_judges_takes_plates_in_step_too() -> None:

@@ -16,7 +16,7 @@ from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
 from dynakin.filter.plate_motion import Needed, brought_into_step, out_of_step_in_words, plates_delay, turned_axes
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.checks import PlateCheck, check_plates
+from dynakin.recordings.checks import PlateCheck, check_plates, likely_unit
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NEAR_M
@@ -114,7 +114,8 @@ def known_ground(
         return Ground(loads, np.zeros(n, dtype=bool), may, False, None, (text,), (text,)), wrench
     # steps off the plates: their mean load is no mass
     mass = None if initial.feet else initial.weighed_kg
-    check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads)
+    steps_kg = initial.weighed_kg if initial.feet else None
+    check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads, steps_kg)
     if check.refusal:
         raise RecordingError(f"{recording.plates_file}: {check.refusal}")
     if loads is not None:
@@ -294,11 +295,13 @@ def _undeclared_in_words(
     weight = initial.weighed_kg * GRAVITY_M_S2
     if _nearly_all(found):
         load = float(np.nanmean(wrench[judged, 1])) / GRAVITY_M_S2
+        named = likely_unit(load * GRAVITY_M_S2, initial.weighed_kg)
+        unit = f", or the forces are in {named}, not N" if named else ""
         return (
             f"Warning: the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
             f"(by the motion {load + float(np.nanmean(found.excess[judged, 1])) / GRAVITY_M_S2:.1f} kg): the mass is "
             "wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, a "
-            "weight, a cable, a rail). The plates are not used for the total."
+            f"weight, a cable, a rail){unit}. The plates are not used for the total."
         ), beyond
     spans, sizes, away = list[str](), list[tuple[float, int]](), list[float]()
     for first, end in runs(found.undeclared):

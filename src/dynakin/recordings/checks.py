@@ -27,7 +27,14 @@ MASS_MEAN_RATIO = (0.6, 1.1)
 """The same for the mean of a movement: steps off the plates make it smaller, nothing makes it larger than
 m g."""
 MASS_RATIO_REFUSED = (0.2, 5.0)
-"""Plates' mass over declared mass beyond which the units or plates must be wrong."""
+"""Plates' mass over declared mass beyond which the units or plates must be wrong; of who steps also beyond
+`MASS_RATIO_OF_UNIT` where a unit explains it."""
+MASS_RATIO_OF_UNIT = (0.5, 2.0)
+UNIT_WITHIN = 0.2
+"""A mean load is that of a unit to this part of it: strides that are not whole make no more."""
+CONVERT = "The forces are probably in {}: convert them to N in the file"
+_STEPPING_S = 0.3
+"""How long all feet that stand must be on plates for the load of who steps to be judged."""
 COP_REFUSED_M = 0.30
 """Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
 be wrong. From `NEAR_M` on it is said."""
@@ -87,6 +94,7 @@ def check_plates(
     mass_kg: float | None = None,
     foot_markers: Mapping[str, Sequence[str]] | None = None,
     loads: FootLoads | None = None,
+    steps_kg: float | None = None,
 ) -> PlateCheck:
     """Check the plates while the person stands still: the vertical force is positive and near m g, each
     centre of pressure lies under a foot and at the height of its sole, the force is near vertical, the free moment acts about the vertical
@@ -102,6 +110,7 @@ def check_plates(
         mass_kg: declared body mass, None if it is to come from the plates.
         foot_markers: foot -> names of the markers on it; where not given no pressure is held against a foot.
         loads: the assignment of plates to these feet, where a run has it already.
+        steps_kg: declared body mass of who may step off the plates: only another unit is found by it.
     """
     if not recording.plates:
         return PlateCheck(None, None, (), "no force plates in this recording, expected at least one")
@@ -113,9 +122,11 @@ def check_plates(
     if mass_kg is None and _nobody_on(recording, ground, feet):
         findings.say("Nobody steps on the plates: they carry nothing, and no foot is on any.")
         return PlateCheck(None, None, tuple(findings.messages), None)
-    mass = _check_vertical(recording, ground, mass_kg, standing, findings)
+    mass = _check_vertical(recording, ground, mass_kg, steps_kg, standing, findings)
     if loads is None:
         loads = foot_loads(recording, ground, foot_markers or {})
+    if steps_kg is not None:
+        _check_steps(recording, ground, steps_kg, loads, findings)
     under: dict[str, str] = {}
     over_edge = standing is not None and _over_the_edge(recording, ground, loads, frames, findings)
     for p, plate in enumerate(recording.plates):
@@ -198,6 +209,7 @@ def _check_vertical(
     recording: Recording,
     ground: GroundFrame,
     mass_kg: float | None,
+    steps_kg: float | None,
     standing: slice | None,
     findings: _Findings,
 ) -> float | None:
@@ -211,7 +223,11 @@ def _check_vertical(
         when = f"standing still from {start:.4g} s to {stop:.4g} s"
     loaded = loaded[np.isfinite(loaded).all(axis=1)]
     if not len(loaded):
-        findings.refuse(f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N")
+        upward = np.nan_to_num(total[:, 1])
+        load = float(upward[upward >= 0.5 * upward.max()].mean())
+        unit = likely_unit(load, mass_kg or steps_kg)
+        probably = f". {CONVERT.format(unit)}" if unit else ""
+        findings.refuse(f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N{probably}")
         return None
     mean = loaded.mean(axis=0)
     vertical = float(mean[1])
@@ -234,6 +250,36 @@ def _check_vertical(
             "of the forces?)"
         )
     return mass
+
+
+def likely_unit(load: float, mass_kg: float | None = None) -> str:
+    """In which other unit a person's mean load of so many "N" may be; "" where it is that of none."""
+    units = [("body weights", 1.0), ("N per kg of body mass", GRAVITY_M_S2), ("% of the body weight", 100.0)]
+    if mass_kg is not None:
+        newtons = [("kg of force", GRAVITY_M_S2), ("pounds of force", 4.448222), ("kN", 1000.0)]
+        units += [(name, mass_kg * GRAVITY_M_S2 / one) for name, one in newtons]
+    fits = [name for name, of_one in units if abs(load / of_one - 1.0) < UNIT_WITHIN]
+    return " or ".join(fits)
+
+
+def _check_steps(
+    recording: Recording, ground: GroundFrame, mass_kg: float, loads: FootLoads, findings: _Findings
+) -> None:
+    """Hold the load of who lifts each foot in turn against the weight, while all feet that stand are on plates; who
+    does not may sit."""
+    push = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))[:, 1]
+    known = loads.total_known & np.isfinite(push)
+    if not loads.aloft.any(axis=0).all() or not np.count_nonzero(known) >= _STEPPING_S * recording.rate:
+        return
+    load = float(push[known].mean())
+    ratio, unit = load / (mass_kg * GRAVITY_M_S2), likely_unit(load, mass_kg)
+    low, high = MASS_RATIO_OF_UNIT if unit else MASS_RATIO_REFUSED
+    if not low < ratio < high:
+        findings.refuse(
+            f"the vertical force is {load:.3g} N on average while every foot that stands is on a plate, where "
+            f"{mass_kg:g} kg weigh {mass_kg * GRAVITY_M_S2:.0f} N. "
+            + (CONVERT.format(unit) if unit else "Look for a wrong unit, or a plate that is missing")
+        )
 
 
 def _compare_mass(mass: float, declared: float, standing: bool, findings: _Findings) -> None:
