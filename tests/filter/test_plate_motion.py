@@ -17,6 +17,7 @@ from dynakin.errors import RecordingError
 from dynakin.filter.parameters import DELAY_UNSEEN_S, parameters_of
 from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
 from dynakin.recordings.recording import Plate, Recording
+from dynakin.results.records import OFF_RATE
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.held_out import measured_wrench
@@ -161,6 +162,37 @@ def test_horizontal_forces_that_are_exchanged_are_named(sign: float, said: str) 
 
     with pytest.raises(RecordingError, match=f"does not fit the motion: .* if the two horizontal forces {said}"):
         person().prepare(with_forces(walk, change))
+
+
+def faster(recording: Recording, factor: float) -> Recording:
+    """All of it, as if it had been recorded so many times as fast."""
+    return replace(recording, time=recording.time / factor)
+
+
+@pytest.mark.parametrize(("motion", "factor"), [("gait", 1.2), ("gait", 0.8), ("squat", 1.2), ("squat", 2.0)])
+def test_a_rate_that_does_not_fit_the_forces_is_told_with_one_that_would(motion: str, factor: float) -> None:
+    whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
+    said = [text for text in person().prepare(faster(whole, factor)).messages if OFF_RATE in text]
+    assert len(said) == 1 and f"at {100.0 * factor:.4g} Hz" in said[0] and "Correct the rate" in said[0]
+    (fits,) = re.findall(r"About ([0-9.]+) Hz would fit", said[0])
+    assert float(fits) == pytest.approx(100.0, abs=6.0)
+
+
+def test_of_a_real_walk_the_rate_is_told_and_of_a_good_one_nothing(data_dir: Path) -> None:
+    """Half of its frames are of 0.5 s then."""
+    folder = data_dir / "opencap_subject4"
+    walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    for factor in (1.0, 1.2, 2.0):
+        said = [text for text in person().prepare(faster(walk, factor)).messages if OFF_RATE in text]
+        assert len(said) == (factor != 1.0)
+        assert not said or "Hz: by the plates" in said[0]
+
+
+@pytest.mark.parametrize("seconds", [(0.0, 14.0), (5.0, 8.0), (0.3, 1.5)])
+def test_a_chair_is_no_wrong_rate(data_dir: Path, seconds: tuple[float, float]) -> None:
+    folder = data_dir / "opencap_subject4"
+    chair = dynakin.read(folder / "STS1.trc", folder / "STS1_grf.mot").window(*seconds)
+    assert not any(OFF_RATE in text for text in person().prepare(chair).messages)
 
 
 WEIGHT = 70.0 * GRAVITY_M_S2

@@ -14,7 +14,15 @@ from dynakin.errors import RecordingError
 from dynakin.filter.closure import Closure, closure
 from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
-from dynakin.filter.plate_motion import Needed, brought_into_step, out_of_step_in_words, plates_delay, turned_axes
+from dynakin.filter.plate_motion import (
+    Needed,
+    brought_into_step,
+    fitting_rate,
+    out_of_step_in_words,
+    plates_delay,
+    turned_axes,
+    wrong_rate_in_words,
+)
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates, likely_unit
 from dynakin.recordings.feet import loads as on_plates
@@ -25,7 +33,7 @@ from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
-from dynakin.results.records import IN_STEP
+from dynakin.results.records import IN_STEP, WARNING
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -118,16 +126,20 @@ def known_ground(
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads, steps_kg)
     if check.refusal:
         raise RecordingError(f"{recording.plates_file}: {check.refusal}")
+    off_rate = list[str]()
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
         if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
             raise RecordingError(f"{recording.plates_file}: {wrong}")
-        delay = None if in_step else plates_delay(needed, np.where(loads.total_known[:, None], wrench[:, :3], np.nan))
+        total = np.where(loads.total_known[:, None], wrench[:, :3], np.nan)
+        delay = None if in_step else plates_delay(needed, total)
         if delay is not None:
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
+        if (found := None if initial.contacts else fitting_rate(needed, total)) is not None:
+            off_rate = [f"{WARNING}{wrong_rate_in_words(needed.rate, *found)}"]
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
     judged = _judged(recording, initial, markers, wrench, loads, check, may, by_plate, tolerance)
-    notes = [*check.messages, *([f"Warning: {turned}."] if turned else []), *judged.notes]
+    notes = [*off_rate, *check.messages, *([f"Warning: {turned}."] if turned else []), *judged.notes]
     reasons = [*judged.reasons]
     undeclared = judged.undeclared
     if loads is not None:

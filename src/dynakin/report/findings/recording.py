@@ -11,7 +11,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import marker_sites
 from dynakin.results.measures.sources import out_of_sight
 from dynakin.results.naming import listed, sentence, words
-from dynakin.results.records import MISPLACED, NEVER_FLAT, REFUSED, WARNING, doubts_mass, warnings_of
+from dynakin.results.records import MISPLACED, NEVER_FLAT, OFF_RATE, REFUSED, WARNING, doubts_mass, warnings_of
 
 # Words of warnings that a finding of their own says, or that are no doubt of the estimate.
 _SAID_ELSEWHERE = (
@@ -37,6 +37,7 @@ ADVICE = {
     "scaling": "Scale the model to the person again, by a standing trial, or run without --model: fullbody measures "
     "its own.",
     "ankles": "Give a standing trial (--static), or take these ankles' angles by their changes alone.",
+    "rate": "Look at which rate the cameras recorded, and whether the files say so.",
     "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
 }
 
@@ -77,6 +78,7 @@ def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
         ("Subject", "subject", lambda text: text.startswith(_SUBJECT)),
         ("Model scaling", "scaling", lambda text: text.startswith(MISPLACED)),
         ("Ankle angles", "ankles", lambda text: text.startswith(NEVER_FLAT)),
+        ("Rate", "rate", lambda text: text.startswith(OFF_RATE)),
         ("Force plates", "plates", lambda text: "plate" in text),
         ("Recording", "recording", lambda text: True),
     ):
