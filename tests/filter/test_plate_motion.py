@@ -132,7 +132,7 @@ def test_a_quarter_turn_is_named(data_dir: Path) -> None:
     ("change", "said"),
     [
         (lambda plate: replace(plate, cop=1000.0 * plate.cop), "beyond the nearest marker"),
-        (lambda plate: replace(plate, cop=plate.cop + [0.0, 0.0, 0.7]), "away from the nearest foot"),
+        (lambda plate: replace(plate, cop=plate.cop + np.array([0.0, 0.0, 0.7])), "away from the nearest foot"),
         (lambda plate: replace(plate, force=plate.force / 63.3), "carry no load"),
     ],
 )
@@ -162,6 +162,50 @@ def test_horizontal_forces_that_are_exchanged_are_named(sign: float, said: str) 
 
     with pytest.raises(RecordingError, match=f"does not fit the motion: .* if the two horizontal forces {said}"):
         person().prepare(with_forces(walk, change))
+
+
+def shifted(recording: Recording, along: int, by_m: float, which: int | None = None) -> Recording:
+    """Plates (one of them) that lie so far along an axis of the laboratory, in the file but not in truth."""
+    offset = by_m * np.eye(3)[along]
+
+    def of(k: int, plate: Plate) -> Plate:
+        if which not in (None, k):
+            return plate
+        corners = None if plate.corners is None else plate.corners + offset
+        moment = plate.moment + np.cross(offset, plate.force)
+        return replace(plate, cop=plate.cop + offset, moment=moment, corners=corners)
+
+    return recording.with_plates(tuple(of(k, plate) for k, plate in enumerate(recording.plates)))
+
+
+@pytest.mark.parametrize(
+    ("by_m", "which", "said"),
+    [
+        (0.0, None, None),
+        (0.05, None, "the plates together by 0.0[3-6] m"),
+        (-0.05, None, "the plates together by 0.0[3-6] m"),
+        (0.09, 1, "plate 2 by 0.0[3-9] m"),
+    ],
+)
+def test_plates_off_their_place_are_told_by_the_movement(by_m: float, which: int | None, said: str | None) -> None:
+    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
+    pressed = walk.plates[0].cop[np.isfinite(walk.plates[0].cop).all(axis=1)]
+    across = int(np.argmin(np.ptp(pressed, axis=0) + 9.0 * np.eye(3)[up]))
+    found = [text for text in person().run(shifted(walk, across, by_m, which)).messages if "does not act" in text]
+    assert len(found) == (said is not None)
+    if said is not None:
+        assert re.search(f"where the plates have it: {said} .X", found[0]) and "Correct the plates' place" in found[0]
+
+
+@pytest.mark.parametrize(("by_m", "told"), [(0.0, False), (0.06, True)])
+def test_plates_of_a_real_walk_off_their_place(data_dir: Path, by_m: float, told: bool) -> None:
+    folder = data_dir / "opencap_subject4"
+    walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    estimator = Estimator(load_model("fullbody", Subject(mass_kg=63.3, height_m=1.70)))
+    found = [text for text in estimator.run(shifted(walk, 0, by_m)).messages if "does not act" in text]
+    assert len(found) == told
+    assert not told or "(X +0.0" in found[0]
 
 
 def faster(recording: Recording, factor: float) -> Recording:

@@ -97,8 +97,8 @@ def check_plates(
     steps_kg: float | None = None,
 ) -> PlateCheck:
     """Check the plates while the person stands still: the vertical force is positive and near m g, each
-    centre of pressure lies under a foot and at the height of its sole, the force is near vertical, the free moment acts about the vertical
-    and is small.
+    centre of pressure lies under a foot and at the height of its sole, the force is near vertical, the free
+    moment acts about the vertical and is small.
 
     Over all frames, no plate may be beyond the limits of friction or of its own edges.
 
