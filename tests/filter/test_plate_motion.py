@@ -17,7 +17,9 @@ from dynakin.errors import RecordingError
 from dynakin.filter.parameters import DELAY_UNSEEN_S, parameters_of
 from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
 from dynakin.recordings.recording import Plate, Recording
+from dynakin.results.records import OFF_RATE
 from dynakin.simulation.trial import simulate as simulate_anew
+from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.held_out import measured_wrench
 
 simulate = cache(simulate_anew)
@@ -127,6 +129,24 @@ def test_a_quarter_turn_is_named(data_dir: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda plate: replace(plate, cop=1000.0 * plate.cop), "beyond the nearest marker"),
+        (lambda plate: replace(plate, cop=plate.cop + np.array([0.0, 0.0, 0.7])), "away from the nearest foot"),
+        (lambda plate: replace(plate, force=plate.force / 63.3), "carry no load"),
+    ],
+)
+def test_what_is_wrong_with_plates_names_the_file_of_the_forces(
+    data_dir: Path, change: Callable[[Plate], Plate], said: str
+) -> None:
+    """It was the file of the markers that was named."""
+    folder = data_dir / "opencap_subject4"
+    walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    with pytest.raises(RecordingError, match=f"^[^ ]*walking1_grf.mot: .*{said}"):
+        person().prepare(walk.with_plates(tuple(change(plate) for plate in walk.plates)))
+
+
+@pytest.mark.parametrize(
     ("sign", "said"), [(-1.0, "are exchanged. "), (1.0, "are exchanged and point the other way. ")]
 )
 def test_horizontal_forces_that_are_exchanged_are_named(sign: float, said: str) -> None:
@@ -142,6 +162,107 @@ def test_horizontal_forces_that_are_exchanged_are_named(sign: float, said: str) 
 
     with pytest.raises(RecordingError, match=f"does not fit the motion: .* if the two horizontal forces {said}"):
         person().prepare(with_forces(walk, change))
+
+
+def shifted(recording: Recording, along: int, by_m: float, which: int | None = None) -> Recording:
+    """Plates (one of them) that lie so far along an axis of the laboratory, in the file but not in truth."""
+    offset = by_m * np.eye(3)[along]
+
+    def of(k: int, plate: Plate) -> Plate:
+        if which not in (None, k):
+            return plate
+        corners = None if plate.corners is None else plate.corners + offset
+        moment = plate.moment + np.cross(offset, plate.force)
+        return replace(plate, cop=plate.cop + offset, moment=moment, corners=corners)
+
+    return recording.with_plates(tuple(of(k, plate) for k, plate in enumerate(recording.plates)))
+
+
+@pytest.mark.parametrize(
+    ("by_m", "which", "said"),
+    [
+        (0.0, None, None),
+        (0.05, None, "the plates together by 0.0[3-6] m"),
+        (-0.05, None, "the plates together by 0.0[3-6] m"),
+        (0.09, 1, "plate 2 by 0.0[3-9] m"),
+    ],
+)
+def test_plates_off_their_place_are_told_by_the_movement(by_m: float, which: int | None, said: str | None) -> None:
+    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
+    pressed = walk.plates[0].cop[np.isfinite(walk.plates[0].cop).all(axis=1)]
+    across = int(np.argmin(np.ptp(pressed, axis=0) + 9.0 * np.eye(3)[up]))
+    found = [text for text in person().run(shifted(walk, across, by_m, which)).messages if "does not act" in text]
+    assert len(found) == (said is not None)
+    if said is not None:
+        assert re.search(f"where the plates have it: {said} .X", found[0]) and "Correct the plates' place" in found[0]
+
+
+@pytest.mark.parametrize(("by_m", "told"), [(0.0, False), (0.06, True)])
+def test_plates_of_a_real_walk_off_their_place(data_dir: Path, by_m: float, told: bool) -> None:
+    folder = data_dir / "opencap_subject4"
+    walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    estimator = Estimator(load_model("fullbody", Subject(mass_kg=63.3, height_m=1.70)))
+    found = [text for text in estimator.run(shifted(walk, 0, by_m)).messages if "does not act" in text]
+    assert len(found) == told
+    assert not told or "(X +0.0" in found[0]
+
+
+def faster(recording: Recording, factor: float) -> Recording:
+    """All of it, as if it had been recorded so many times as fast."""
+    return replace(recording, time=recording.time / factor)
+
+
+@pytest.mark.parametrize(("motion", "factor"), [("gait", 1.2), ("gait", 0.8), ("squat", 1.2), ("squat", 2.0)])
+def test_a_rate_that_does_not_fit_the_forces_is_told_with_one_that_would(motion: str, factor: float) -> None:
+    whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
+    said = [text for text in person().prepare(faster(whole, factor)).messages if OFF_RATE in text]
+    assert len(said) == 1 and f"at {100.0 * factor:.4g} Hz" in said[0] and "Correct the rate" in said[0]
+    (fits,) = re.findall(r"About ([0-9.]+) Hz would fit", said[0])
+    assert float(fits) == pytest.approx(100.0, abs=6.0)
+
+
+def test_of_a_real_walk_the_rate_is_told_and_of_a_good_one_nothing(data_dir: Path) -> None:
+    """Half of its frames are of 0.5 s then."""
+    folder = data_dir / "opencap_subject4"
+    walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    for factor in (1.0, 1.2, 2.0):
+        said = [text for text in person().prepare(faster(walk, factor)).messages if OFF_RATE in text]
+        assert len(said) == (factor != 1.0)
+        assert not said or "Hz: by the plates" in said[0]
+
+
+@pytest.mark.parametrize("seconds", [(0.0, 14.0), (5.0, 8.0), (0.3, 1.5)])
+def test_a_chair_is_no_wrong_rate(data_dir: Path, seconds: tuple[float, float]) -> None:
+    folder = data_dir / "opencap_subject4"
+    chair = dynakin.read(folder / "STS1.trc", folder / "STS1_grf.mot").window(*seconds)
+    assert not any(OFF_RATE in text for text in person().prepare(chair).messages)
+
+
+WEIGHT = 70.0 * GRAVITY_M_S2
+
+
+@pytest.mark.parametrize(
+    ("one", "unit"),
+    [
+        (0.01 * WEIGHT, "% of the body weight"),
+        (WEIGHT, "body weights"),
+        (70.0, "N per kg of body mass"),
+        (4.448, "pounds of force"),
+        (GRAVITY_M_S2, "kg of force"),
+    ],
+)
+def test_another_unit_of_the_forces_of_a_walk_is_refused_and_named(one: float, unit: str) -> None:
+    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    with pytest.raises(RecordingError, match=f"probably in {unit}: convert them to N in the file"):
+        person().prepare(with_forces(walk, lambda force: force / one))
+
+
+def test_another_unit_of_the_forces_of_a_squat_is_named() -> None:
+    """It is no reason to refuse: who sits all the time bears as little on the feet."""
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    ready = person().prepare(with_forces(squat, lambda force: 100.0 / WEIGHT * force))
+    assert any("or the forces are in % of the body weight, not N" in text for text in ready.messages)
 
 
 def test_who_judges_takes_plates_in_step_too() -> None:

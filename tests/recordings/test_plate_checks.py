@@ -116,6 +116,47 @@ def test_pressure_somewhat_off_the_foot_is_a_warning() -> None:
     assert any(text.startswith("Warning: plate 1: centre of pressure 200 mm away") for text in found.messages)
 
 
+def raised(recording: Recording, by_m: float) -> Recording:
+    """Its plates thought so much higher than they are."""
+    up = np.array([0.0, by_m, 0.0])
+    plates = [replace(p, cop=p.cop + up, moment=p.moment + np.cross(up, p.force)) for p in recording.plates]
+    return recording.with_plates(tuple(plates))
+
+
+@pytest.mark.parametrize(
+    ("by_m", "said", "refused"),
+    [
+        (0.03, "", False),
+        (0.06, "20 mm above", False),
+        (0.15, "110 mm above", False),
+        (0.40, "360 mm above", True),
+        (-0.07, "", False),
+        (-0.15, "190 mm below", False),
+        (-0.50, "540 mm below", True),
+    ],
+)
+def test_a_plate_at_another_height_than_the_soles_is_told(by_m: float, said: str, refused: bool) -> None:
+    found = check(raised(standing(70.0), by_m))
+    texts = (found.refusal or "").split("; ") if refused else warnings(found)
+    about = [text for text in texts if "its surface lies" in text]
+    assert len(about) == (2 if said else 0) and (found.refusal is not None) == refused
+    for text, plate, foot in zip(about, ("plate 1", "plate 2"), ("left", "right"), strict=False):
+        assert f"{plate}: its surface lies {said} the lowest marker of the {foot} foot" in text
+        assert "Correct its height in the file" in text and ("unless a box" in text) == (0.0 > by_m > -0.3)
+
+
+def test_a_foot_without_a_low_marker_accuses_no_plate() -> None:
+    """One that shows its ankle alone, with 0.11 m of shoe and ankle under the marker."""
+    made = standing(70.0)
+    markers = made.markers.copy()
+    for name in ("LHEE", "RHEE"):
+        markers[:, made.marker_names.index(name)] += [0.06, 0.07, 0.0]
+    feet = {"left": ["LHEE"], "right": ["RHEE"]}
+    recording = replace(made, markers=markers)
+    found = check_plates(recording, find_ground_frame(recording, vertical="+Y"), 70.0, feet)
+    assert found.refusal is None and not any("surface" in text for text in found.messages)
+
+
 def test_both_plates_under_one_foot_and_big_free_moments_are_told() -> None:
     good = standing(70.0)
     doubled = replace(good, plates=(good.plates[0], replace(good.plates[0], name="plate 2")))

@@ -19,7 +19,7 @@ from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.skin import following_skin, may_follow
-from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
+from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground, off_place
 from dynakin.filter.tracker import Tracker, known_lag
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.declared import with_contacts, with_loads
@@ -298,6 +298,10 @@ class Estimator:
         doubt = [ready.doubt + unsought] if ready.doubt else clock if ground.usable else []
         config["noise_used"] = tracker.noise.scales()
         notes += [*doubt, *ready.unsmoothed]
+        plates = [plate.name for plate in recording.plates]
+        if not ready.doubt:
+            text = off_place(ground, calibrated, tracker.core_model, arrays["state"], wrench, plates)
+            notes += [text] if text else []
         if tracker.systematic is not None:
             notes += tracker.systematic.misfit(arrays["state"][-1])
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)

@@ -68,7 +68,7 @@ def recording_arrays(recording: Recording, initial: CalibratedModel, *, gaps: bo
     elif len(bad):
         k = int(bad[0])
         raise RecordingError(
-            f"{where}: the plates' wrench at frame {k + 1} ({recording.time[k]:.3f} s) is {wrench[k]}, "
+            f"{recording.plates_file}: the plates' wrench at frame {k + 1} ({recording.time[k]:.3f} s) is {wrench[k]}, "
             f"expected numbers ({len(bad)} such frame{'s' if len(bad) > 1 else ''})"
         )
     return np.ascontiguousarray(markers), np.ascontiguousarray(wrench)

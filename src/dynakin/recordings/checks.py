@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
+from dynakin.arrays import runs
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NEAR_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
@@ -16,6 +18,7 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.plates.surfaces import SHOE_M
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.units import GRAVITY_M_S2, PERSON_MASS_KG
@@ -26,10 +29,26 @@ MASS_MEAN_RATIO = (0.6, 1.1)
 """The same for the mean of a movement: steps off the plates make it smaller, nothing makes it larger than
 m g."""
 MASS_RATIO_REFUSED = (0.2, 5.0)
-"""Plates' mass over declared mass beyond which the units or plates must be wrong."""
+"""Plates' mass over declared mass beyond which the units or plates must be wrong; of who steps also beyond
+`MASS_RATIO_OF_UNIT` where a unit explains it."""
+MASS_RATIO_OF_UNIT = (0.5, 2.0)
+UNIT_WITHIN = 0.2
+"""A mean load is that of a unit to this part of it: strides that are not whole make no more."""
+CONVERT = "The forces are probably in {}: convert them to N in the file"
+_NO_LOAD = f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N"
+_STEPPING_S = 0.3
+"""How long all feet that stand must be on plates for the load of who steps to be judged, and a plate be loaded, and not,
+for it to be stepped on."""
 COP_REFUSED_M = 0.30
 """Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
 be wrong. From `NEAR_M` on it is said."""
+ABOVE_SURFACE_M = (-0.01, SHOE_M)
+"""Height of a foot's lowest marker over the centre of pressure under it, in a quarter of its load: 17 to 78 mm in 18
+real recordings, 9 to 40 in simulated ones; a foot that shows nothing but an ankle, 0.1 m."""
+HEIGHT_REFUSED_M = (-0.30, 0.45)
+"""The same, beyond which the plate's height is refused: people step onto boxes on a plate, but not into a plate."""
+_HEIGHT_S = 0.1
+"""So long a foot must be seen under a load for its height to be judged."""
 TILT_WARNING_DEG = 10.0
 """Standing force against the vertical; flat standing gives 1 to 3 deg."""
 OVER_EDGE_M = 0.01
@@ -81,10 +100,11 @@ def check_plates(
     mass_kg: float | None = None,
     foot_markers: Mapping[str, Sequence[str]] | None = None,
     loads: FootLoads | None = None,
+    steps_kg: float | None = None,
 ) -> PlateCheck:
     """Check the plates while the person stands still: the vertical force is positive and near m g, each
-    centre of pressure lies under a foot, the force is near vertical, the free moment acts about the vertical
-    and is small.
+    centre of pressure lies under a foot and at the height of its sole, the force is near vertical, the free
+    moment acts about the vertical and is small.
 
     Over all frames, no plate may be beyond the limits of friction or of its own edges.
 
@@ -96,19 +116,26 @@ def check_plates(
         mass_kg: declared body mass, None if it is to come from the plates.
         foot_markers: foot -> names of the markers on it; where not given no pressure is held against a foot.
         loads: the assignment of plates to these feet, where a run has it already.
+        steps_kg: declared body mass of who may step off the plates: only another unit is found by it.
     """
     if not recording.plates:
         return PlateCheck(None, None, (), "no force plates in this recording, expected at least one")
     findings = _Findings()
     standing = _on_plates(standing_window(recording), recording, ground)
     frames = standing if standing is not None else slice(None)
-    feet = _feet(recording, ground, foot_markers or {}, findings)
+    places = _feet(recording, ground, foot_markers or {}, findings)
+    feet = {foot: place[:, :, [0, 2]] for foot, place in places.items()}
     if mass_kg is None and (idle := _idle(recording, ground, feet)):
         findings.messages.append(idle)
-        return PlateCheck(None, None, tuple(findings.messages), None, unused=idle.startswith("Warning"))
-    mass = _check_vertical(recording, ground, mass_kg, standing, findings)
+        unused = idle.startswith("Warning")
+        unit = _unit_of_steps(recording, ground, steps_kg) if unused else ""
+        refusal = f"{_NO_LOAD}. {CONVERT.format(unit)}" if unit else None
+        return PlateCheck(None, None, tuple(findings.messages), refusal, unused=unused)
+    mass = _check_vertical(recording, ground, mass_kg, steps_kg, standing, findings)
     if loads is None:
         loads = foot_loads(recording, ground, foot_markers or {})
+    if steps_kg is not None:
+        _check_steps(recording, ground, steps_kg, loads, findings)
     under: dict[str, str] = {}
     over_edge = standing is not None and _over_the_edge(recording, ground, loads, frames, findings)
     for p, plate in enumerate(recording.plates):
@@ -124,6 +151,7 @@ def check_plates(
             continue
         hidden = [name for name, own in (foot_markers or {}).items() if not own]
         foot = _check_pressure(plate, loaded, feet, _owner(loads, loaded, p), ground, hidden, findings)
+        _check_height(plate, loaded, places, recording.rate, ground, findings)
         _check_free_moment(plate, loaded, ground, findings)
         _check_level(plate, ground, findings)
         if standing is not None and foot in under:
@@ -158,6 +186,25 @@ def _idle(recording: Recording, ground: GroundFrame, feet: Mapping[str, Array]) 
         "without plates, and the ground reaction follows from the motion. If somebody steps on them, look whether "
         "their channels were connected and which unit they are in, or give the forces in N (--forces)."
     )
+
+
+def _unit_of_steps(recording: Recording, ground: GroundFrame, mass_kg: float | None) -> str:
+    """The unit in which somebody steps onto one of the plates and off it; "" where nobody does: an idle plate's offset
+    has no steps."""
+    pushes = [np.nan_to_num(ground.vectors_to_ground(plate.force)[:, 1]) for plate in recording.plates]
+
+    def lasts(flags: npt.NDArray[np.bool_]) -> bool:
+        return any(end - first >= _STEPPING_S * recording.rate for first, end in runs(flags))
+
+    if not any(lasts(push > 0.5 * push.max()) and lasts(push < 0.05 * push.max()) for push in pushes):
+        return ""
+    return likely_unit(_while_loaded(np.sum(pushes, axis=0)), mass_kg)
+
+
+def _while_loaded(push: Array) -> float:
+    """Mean of the larger half of a vertical force (T,)."""
+    upward = np.nan_to_num(push)
+    return float(upward[upward >= 0.5 * upward.max()].mean())
 
 
 def _beside(plate: Plate, ground: GroundFrame, feet: Mapping[str, Array]) -> bool:
@@ -201,6 +248,7 @@ def _check_vertical(
     recording: Recording,
     ground: GroundFrame,
     mass_kg: float | None,
+    steps_kg: float | None,
     standing: slice | None,
     findings: _Findings,
 ) -> float | None:
@@ -214,10 +262,12 @@ def _check_vertical(
         when = f"standing still from {start:.4g} s to {stop:.4g} s"
     loaded = loaded[np.isfinite(loaded).all(axis=1)]
     if not len(loaded):
-        findings.refuse(
-            f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N, and this model needs it; give "
-            "the forces of the plates that were stood on (--forces), or take --model fullbody, which does without"
+        unit = likely_unit(_while_loaded(total[:, 1]), mass_kg or steps_kg)
+        needed = (
+            ", and this model needs it; give the forces of the plates that were stood on (--forces), or take --model "
+            "fullbody, which does without"
         )
+        findings.refuse(f"{_NO_LOAD}. {CONVERT.format(unit)}" if unit else _NO_LOAD + needed)
         return None
     mean = loaded.mean(axis=0)
     vertical = float(mean[1])
@@ -242,6 +292,36 @@ def _check_vertical(
     return mass
 
 
+def likely_unit(load: float, mass_kg: float | None = None) -> str:
+    """In which other unit a person's mean load of so many "N" may be; "" where it is that of none."""
+    units = [("body weights", 1.0), ("N per kg of body mass", GRAVITY_M_S2), ("% of the body weight", 100.0)]
+    if mass_kg is not None:
+        newtons = [("kg of force", GRAVITY_M_S2), ("pounds of force", 4.448222), ("kN", 1000.0)]
+        units += [(name, mass_kg * GRAVITY_M_S2 / one) for name, one in newtons]
+    fits = [name for name, of_one in units if abs(load / of_one - 1.0) < UNIT_WITHIN]
+    return " or ".join(fits)
+
+
+def _check_steps(
+    recording: Recording, ground: GroundFrame, mass_kg: float, loads: FootLoads, findings: _Findings
+) -> None:
+    """Hold the load of who lifts each foot in turn against the weight, while all feet that stand are on plates; who
+    does not may sit."""
+    push = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))[:, 1]
+    known = loads.total_known & np.isfinite(push)
+    if not loads.aloft.any(axis=0).all() or not np.count_nonzero(known) >= _STEPPING_S * recording.rate:
+        return
+    load = float(push[known].mean())
+    ratio, unit = load / (mass_kg * GRAVITY_M_S2), likely_unit(load, mass_kg)
+    low, high = MASS_RATIO_OF_UNIT if unit else MASS_RATIO_REFUSED
+    if not low < ratio < high:
+        findings.refuse(
+            f"the vertical force is {load:.3g} N on average while every foot that stands is on a plate, where "
+            f"{mass_kg:g} kg weigh {mass_kg * GRAVITY_M_S2:.0f} N. "
+            + (CONVERT.format(unit) if unit else "Look for a wrong unit, or a plate that is missing")
+        )
+
+
 def _compare_mass(mass: float, declared: float, standing: bool, findings: _Findings) -> None:
     ratio = mass / declared
     text = f"the plates read {mass:.2f} kg, the declared mass is {declared:g} kg ({100 * (ratio - 1):+.1f} %)"
@@ -258,8 +338,8 @@ def _compare_mass(mass: float, declared: float, standing: bool, findings: _Findi
 def _feet(
     recording: Recording, ground: GroundFrame, markers: Mapping[str, Sequence[str]], findings: _Findings
 ) -> dict[str, Array]:
-    places = foot_places(recording, ground, markers)
-    feet = {foot: place[:, :, [0, 2]] for foot, (_, place) in places.items()}
+    """Places (T, K, 3) m of each foot's markers, ground frame."""
+    feet = {foot: place for foot, (_, place) in foot_places(recording, ground, markers).items()}
     if not feet:
         findings.warn("no foot markers, so it was not checked that the centres of pressure lie under the feet.")
     return feet
@@ -319,6 +399,38 @@ def _check_pressure(
     else:
         findings.warn(f"{text}, expected at most {1000 * NEAR_M:.0f} mm.")
     return None
+
+
+def _check_height(
+    plate: Plate, loaded: np.ndarray, feet: Mapping[str, Array], rate: float, ground: GroundFrame, findings: _Findings
+) -> None:
+    """Compare with the lowest markers of the feet under which the centre of pressure lies."""
+    cop = ground.points_to_ground(plate.cop[loaded])
+    above, over = np.full(len(loaded), np.inf), ""
+    for foot, places in feet.items():
+        own = places[loaded]
+        lowest = np.where(np.isfinite(own[..., 1]), own[..., 1], np.inf).min(axis=1) - cop[:, 1]
+        under = distance_to_hull(cop[:, [0, 2]], own[..., [0, 2]]) <= NEAR_M
+        if (under & (lowest < above)).any():
+            over = f"{over} or {foot}" if over else foot
+        above = np.where(under, np.fmin(above, lowest), above)
+    above = above[np.isfinite(above)]
+    if not len(above) >= max(_HEIGHT_S * rate, 1.0):  # a rate that is NaN, too
+        return
+    height = float(np.percentile(above, 25.0))
+    low, high = ABOVE_SURFACE_M
+    if low <= height <= high:
+        return
+    where = f"{1000 * abs(height):.0f} mm {'below' if height > 0.0 else 'above'}"
+    text = (
+        f"{plate.name}: its surface lies {where} the lowest marker of the {over} foot that stands on it, expected at "
+        f"most {1000 * (high if height > 0.0 else -low):.0f} mm. Correct its height in the file (of its corners, or of "
+        "the centres of pressure)"
+    )
+    if HEIGHT_REFUSED_M[0] <= height <= HEIGHT_REFUSED_M[1]:
+        findings.warn(f"{text}{', unless a box stands on it' if height > 0.0 else ''}.")
+    else:
+        findings.refuse(text)
 
 
 def _check_free_moment(plate: Plate, loaded: np.ndarray, ground: GroundFrame, findings: _Findings) -> None:

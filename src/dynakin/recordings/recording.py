@@ -134,6 +134,11 @@ class Recording:
         )
 
     @property
+    def plates_file(self) -> str:
+        """What the plates were read from: the file to name where something is wrong with them."""
+        return str(self.read_with.get("forces") or self.path or self.name)
+
+    @property
     def n_frames(self) -> int:
         """Number of frames T."""
         return len(self.time)

@@ -75,7 +75,7 @@ def find_mass(
         loads = foot_loads(recording, ground, foot_markers)
         check = check_plates(recording, ground, None, foot_markers, loads)
         if check.refusal is not None:
-            reasons.append(f"{recording.name}: {check.refusal}")
+            reasons.append(f"{recording.plates_file}: {check.refusal}")
         elif check.mass_kg_from_plates is None:
             mean, why = steady_load(recording, loads)
             reasons.append(f"nobody stands still on the plates of {recording.name}, and {why}")
