@@ -25,13 +25,14 @@ from dynakin.filter.plate_motion import (
     wrong_rate_in_words,
 )
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.checks import PlateCheck, check_plates, likely_unit
+from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.axes import turned_feet
+from dynakin.recordings.plates.force_unit import likely_unit
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import listed

@@ -8,14 +8,13 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NEAR_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.force_unit import CONVERT, STEPPING_S, likely_unit, unit_of_steps, while_loaded
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.plates.surfaces import SHOE_M
@@ -32,13 +31,7 @@ MASS_RATIO_REFUSED = (0.2, 5.0)
 """Plates' mass over declared mass beyond which the units or plates must be wrong; of who steps also beyond
 `MASS_RATIO_OF_UNIT` where a unit explains it."""
 MASS_RATIO_OF_UNIT = (0.5, 2.0)
-UNIT_WITHIN = 0.2
-"""A mean load is that of a unit to this part of it: strides that are not whole make no more."""
-CONVERT = "The forces are probably in {}: convert them to N in the file"
 _NO_LOAD = f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N"
-_STEPPING_S = 0.3
-"""How long all feet that stand must be on plates for the load of who steps to be judged, and a plate be loaded, and not,
-for it to be stepped on."""
 COP_REFUSED_M = 0.30
 """Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
 be wrong. From `NEAR_M` on it is said."""
@@ -128,7 +121,7 @@ def check_plates(
     if mass_kg is None and (idle := _idle(recording, ground, feet)):
         findings.messages.append(idle)
         unused = idle.startswith("Warning")
-        unit = _unit_of_steps(recording, ground, steps_kg) if unused else ""
+        unit = unit_of_steps(recording, ground, steps_kg) if unused else ""
         refusal = f"{_NO_LOAD}. {CONVERT.format(unit)}" if unit else None
         return PlateCheck(None, None, tuple(findings.messages), refusal, unused=unused)
     mass = _check_vertical(recording, ground, mass_kg, steps_kg, standing, findings)
@@ -188,25 +181,6 @@ def _idle(recording: Recording, ground: GroundFrame, feet: Mapping[str, Array]) 
     )
 
 
-def _unit_of_steps(recording: Recording, ground: GroundFrame, mass_kg: float | None) -> str:
-    """The unit in which somebody steps onto one of the plates and off it; "" where nobody does: an idle plate's offset
-    has no steps."""
-    pushes = [np.nan_to_num(ground.vectors_to_ground(plate.force)[:, 1]) for plate in recording.plates]
-
-    def lasts(flags: npt.NDArray[np.bool_]) -> bool:
-        return any(end - first >= _STEPPING_S * recording.rate for first, end in runs(flags))
-
-    if not any(lasts(push > 0.5 * push.max()) and lasts(push < 0.05 * push.max()) for push in pushes):
-        return ""
-    return likely_unit(_while_loaded(np.sum(pushes, axis=0)), mass_kg)
-
-
-def _while_loaded(push: Array) -> float:
-    """Mean of the larger half of a vertical force (T,)."""
-    upward = np.nan_to_num(push)
-    return float(upward[upward >= 0.5 * upward.max()].mean())
-
-
 def _beside(plate: Plate, ground: GroundFrame, feet: Mapping[str, Array]) -> bool:
     """Whether no foot comes near a plate, as far as its corners are known."""
     if plate.corners is None:
@@ -262,7 +236,7 @@ def _check_vertical(
         when = f"standing still from {start:.4g} s to {stop:.4g} s"
     loaded = loaded[np.isfinite(loaded).all(axis=1)]
     if not len(loaded):
-        unit = likely_unit(_while_loaded(total[:, 1]), mass_kg or steps_kg)
+        unit = likely_unit(while_loaded(total[:, 1]), mass_kg or steps_kg)
         needed = (
             ", and this model needs it; give the forces of the plates that were stood on (--forces), or take --model "
             "fullbody, which does without"
@@ -292,16 +266,6 @@ def _check_vertical(
     return mass
 
 
-def likely_unit(load: float, mass_kg: float | None = None) -> str:
-    """In which other unit a person's mean load of so many "N" may be; "" where it is that of none."""
-    units = [("body weights", 1.0), ("N per kg of body mass", GRAVITY_M_S2), ("% of the body weight", 100.0)]
-    if mass_kg is not None:
-        newtons = [("kg of force", GRAVITY_M_S2), ("pounds of force", 4.448222), ("kN", 1000.0)]
-        units += [(name, mass_kg * GRAVITY_M_S2 / one) for name, one in newtons]
-    fits = [name for name, of_one in units if abs(load / of_one - 1.0) < UNIT_WITHIN]
-    return " or ".join(fits)
-
-
 def _check_steps(
     recording: Recording, ground: GroundFrame, mass_kg: float, loads: FootLoads, findings: _Findings
 ) -> None:
@@ -309,7 +273,7 @@ def _check_steps(
     does not may sit."""
     push = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))[:, 1]
     known = loads.total_known & np.isfinite(push)
-    if not loads.aloft.any(axis=0).all() or not np.count_nonzero(known) >= _STEPPING_S * recording.rate:
+    if not loads.aloft.any(axis=0).all() or not np.count_nonzero(known) >= STEPPING_S * recording.rate:
         return
     load = float(push[known].mean())
     ratio, unit = load / (mass_kg * GRAVITY_M_S2), likely_unit(load, mass_kg)
