@@ -36,7 +36,7 @@ def unit_of_steps(recording: Recording, ground: GroundFrame, mass_kg: float | No
     def lasts(flags: npt.NDArray[np.bool_]) -> bool:
         return any(end - first >= STEPPING_S * recording.rate for first, end in runs(flags))
 
-    if not any(lasts(push > 0.5 * push.max()) and lasts(push < 0.05 * push.max()) for push in pushes):
+    if not any(lasts(push > 0.2 * push.max()) and lasts(push < 0.05 * push.max()) for push in pushes):
         return ""
     return likely_unit(while_loaded(np.sum(pushes, axis=0)), mass_kg)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.files.motion import force_stem, write_sources
-from dynakin.results.files.storage import DECIMALS_OF_LOADS, DECIMALS_OF_PLACES, DIGITS, DIGITS_OF_LOADS, write_storage
+from dynakin.results.files.storage import DECIMALS_OF_LOADS, DIGITS, DIGITS_OF_LOADS, write_storage
 from dynakin.results.measures.angles import angle_columns
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import foot_pressure
@@ -176,7 +175,6 @@ def _write(
     notes: list[str],
 ) -> None:
     """Loads, and the places that go with them."""
-    places = re.compile("_p[xyz]$")
     write_storage(
         path,
         title,
@@ -186,5 +184,5 @@ def _write(
         in_degrees=False,
         notes=notes,
         digits=DIGITS_OF_LOADS,
-        decimals=[DECIMALS_OF_PLACES if places.search(name) else DECIMALS_OF_LOADS for name in names],
+        decimals=DECIMALS_OF_LOADS,
     )

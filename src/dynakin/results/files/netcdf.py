@@ -50,14 +50,12 @@ _FLAGGED = {"moments": "moment_source", "moments_sd": "moment_source", "joint_lo
 _SMALL = 1000  # values; fewer are not worth compressing
 _MOST_ROWS = 4096  # of a chunk
 _COMPRESSION = 1  # of 9; 4 takes twice as long for 4 % less
-_SHARE_OF_SD = 5e-4  # second differences of angles are then off by 3 % of the deviation of an acceleration
-_SD_BITS = 10  # a twentieth of a percent of what is not known to ten
-_COVARIANCE_BITS = 24
-"""The smallest eigenvalues of a covariance are differences of large numbers: of its correlations 2e-4 in a squat, whose
-sixth digit this keeps; with 32 bits a megabyte is a tenth more."""
-_STEPS = {"markers": 2.0**-20, "joint_centres": 2.0**-20, "joint_orientations": 2.0**-18, "joint_loads": 2.0**-10}
-"""About 1 µm, 4e-6 of a direction's cosine (a thousandth of its deviation), 1 mN and 1 mN m. Powers of two leave zeros
-at the end, which compress."""
+_SHARE_OF_SD = 1e-4  # who takes second differences sees a thousandth
+_SD_BITS = 12
+_COVARIANCE_BITS = 32
+"""The smallest eigenvalues of a covariance are differences of large numbers."""
+_STEPS = {"markers": 2.0**-20, "joint_centres": 2.0**-20, "joint_orientations": 2.0**-20, "joint_loads": 2.0**-10}
+"""About 1 µm, 1e-6 of a direction's cosine, 1 mN and 1 mN m. Powers of two leave zeros at the end, which compress."""
 ONE_AT_A_TIME = Lock()
 """Who reads or writes by the netCDF library: it lets go of the interpreter, and does not bear a second thread."""
 _PARAMETER_NUMBERS = ("value", "sd", "initial", "table", "lower", "upper")
@@ -114,8 +112,8 @@ def full_dataset(estimate: Estimate) -> xr.Dataset:
 
 def write_netcdf(estimate: Estimate, path: Path) -> None:
     """Write `full_dataset`, compressed, tables over time in single precision (6e-8 of each value) and what has a
-    deviation with it in steps of 5e-4 of that at most, those of `_STEPS` in whole steps, deviations and test
-    ratios to 5e-4 and covariances to 3e-8 of each entry.
+    deviation with it in steps of 1e-4 of that at most, those of `_STEPS` in whole steps, deviations and test
+    ratios to 1e-4 and covariances to 1e-10 of each entry.
 
     Times and constants stay as they are.
     """

@@ -18,10 +18,8 @@ DIGITS_OF_RATES = 6
 """Of speeds and accelerations: a millidegree a second of a hundred degrees, where deviations are whole ones."""
 DIGITS_OF_LOADS = 6
 """Of forces, moments and powers: 1 mN of a body's weight."""
-DECIMALS_OF_LOADS = 3
-"""Of these: 1 mN, 1 mN m and 1 mW, a thousandth of their deviations and less; finer is rounding, where nothing acts."""
-DECIMALS_OF_PLACES = 6
-"""Of the places that go with them: 1 um."""
+DECIMALS_OF_LOADS = 6
+"""Of these and the places that go with them: less than 1 uN, 1 um is rounding, where nothing acts."""
 DIGITS_OF_SD = 3
 """Of a standard deviation, which itself is not known to two."""
 _TIME = "%.12g"
@@ -37,7 +35,7 @@ def write_storage(
     in_degrees: bool,
     notes: Sequence[str] = (),
     digits: int = EXACT,
-    decimals: int | Sequence[int] | None = None,
+    decimals: int | None = None,
 ) -> None:
     """Write one table.
 
@@ -48,13 +46,9 @@ def write_storage(
         values: (T, N) in the units that the file is to carry; NaN is written as ``nan``, and so is infinity.
         in_degrees: OpenSim's header line; says in what the rotational columns are given.
         notes: lines of the header for people, ``;`` and ``=`` excluded since readers take ``key=value`` for settings.
-        digits: significant ones of the values. decimals: after which all is rounding, however small the value; of
-            all columns or of each.
+        digits: significant ones of the values. decimals: after which all is rounding, however small the value.
     """
-    values = finite(values)
-    if decimals is not None:
-        steps = 10.0 ** np.array(decimals)
-        values = np.round(steps * values) / steps + 0.0  # no -0
+    values = finite(values) if decimals is None else np.round(finite(values), decimals) + 0.0  # no -0
     if values.shape != (len(time), len(names)):
         raise OutputError(
             f"{path.name}: values of shape {values.shape}, expected ({len(time)}, {len(names)}) for its names"
