@@ -16,10 +16,11 @@ from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.expected import ContactPaths, expected_loads
+from dynakin.filter.plate_place import off_place
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.skin import following_skin, may_follow
-from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground, off_place
+from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
 from dynakin.filter.tracker import Tracker, known_lag
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.declared import with_contacts, with_loads
