@@ -195,7 +195,7 @@ def test_plates_off_their_place_are_told_by_the_movement(by_m: float, which: int
     found = [text for text in person().run(shifted(walk, across, by_m, which)).messages if "does not act" in text]
     assert len(found) == (said is not None)
     if said is not None:
-        assert re.search(f"where the plates have it: {said} .X", found[0]) and "Correct the plates' place" in found[0]
+        assert re.search(f"where the plates have it: {said} .X", found[0]) and "the plates lie elsewhere" in found[0]
 
 
 @pytest.mark.parametrize(("by_m", "told"), [(0.0, False), (0.06, True)])

@@ -63,8 +63,8 @@ def off_place(
     said = [f"{name} by {np.hypot(*by):.2f} m (X {by[0]:+.2f}, Z {by[1]:+.2f})" for name, by in found.items()]
     return (
         f"Warning: by the movement the force does not act where the plates have it: {listed(said)}, ground frame, "
-        f"expected within {limit:.2f} m. Correct the plates' place in the file (corners, origin, or centres of "
-        "pressure)."
+        f"expected within {limit:.2f} m. Either the plates lie elsewhere than the file says (corners, origin, centres "
+        "of pressure), or something else steadies the person."
     )
 
 
