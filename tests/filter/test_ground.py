@@ -14,6 +14,7 @@ import pytest
 
 import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
+from dynakin.cli.prepared import assumed
 from dynakin.filter.closure import closure
 from dynakin.filter.impossible import impossible
 from dynakin.filter.sources import with_sources
@@ -29,6 +30,7 @@ from dynakin.report.insights import insights
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, out_of_sight, wrench_sources
+from dynakin.settings.settings import Settings
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 from support.estimates.walking import make_walker
@@ -152,11 +154,11 @@ def test_a_walk_whose_file_has_a_wrong_rate_has_no_derived_forces() -> None:
     assert (sources(found, "knee_angle_r")[derived[:, 0]] == ABSENT).all()
     assert np.isnan(found.data["moments"].sel(coordinate="knee_angle_r").values[derived[:, 0]]).all()
     assert np.isnan(found.data["wrench_estimated"].values[derived.any(axis=1)]).all()
-    (said,) = [text for text in found.messages if "no ground's" in text]
+    (said,) = [text for text in found.messages if "no ground gives" in text]
     reasons = compute_metrics(found)["moments"]["reasons"]
-    assert said.startswith("Warning: ") and any("no ground's" in text for text in reasons)
+    assert said.startswith("Warning: ") and any("ground gives" in text for text in reasons)
     findings = {one.title: one for one in insights(found, compute_metrics(found)) if one.level == "warning"}
-    assert "no ground's" in findings["Recording"].text
+    assert "ground gives" in findings["Recording"].text
 
 
 @pytest.mark.parametrize(
@@ -185,6 +187,18 @@ def test_plates_that_carry_nobody_are_as_none_and_warned_of() -> None:
     assert found.loads is not None and none.loads is not None and not found.usable
     np.testing.assert_array_equal(found.loads.reason, none.loads.reason)
     assert found.notes[0].startswith("Warning: the plates carry nobody") and found.notes[1:] == none.notes
+
+
+def test_a_walk_beside_plates_that_carry_nobody_runs_from_file_to_result() -> None:
+    """What indexes the assignment by the recording's plates finds them there, with nobody on any."""
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    idle = tuple(replace(p, force=0.0 * p.force + 3.0, moment=0.0 * p.moment, cop=np.nan * p.cop) for p in walk.plates)
+    estimator = person("fullbody")
+    ready = estimator.prepare(walk.with_plates(idle))
+    assert dict(assumed(ready, Settings()))["Plates"] == "3: no foot stands on any."
+    found = estimator.run(walk.with_plates(idle))
+    assert (wrench_sources(found.data) != MEASURED).all()
+    assert any("carry nobody" in text for text in found.messages)
 
 
 def test_two_feet_on_one_plate_are_a_prior_and_their_sum_is_measured() -> None:

@@ -34,6 +34,13 @@ def test_dropped_frames(motion: str, seed: int) -> None:
         assert not warned(less, np.delete(time, np.arange(100, 100 + count)))  # their times are right
 
 
+def test_stamps_that_scatter_are_no_dropped_frames() -> None:
+    """What lies a third of a step late makes the next step look short."""
+    recording = simulate("fullbody", "gait", 3, 2.5, markers="opencap").recording
+    late = np.random.default_rng(1).random(recording.n_frames) < 0.05
+    assert not warned(recording.markers, recording.time + 0.008 * late)
+
+
 def test_real_recordings_are_whole(data_dir: Path) -> None:
     for recording in real_trials(data_dir):
         assert not [note for note in recording.notes if SAID in note], recording.name

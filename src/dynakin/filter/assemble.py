@@ -72,10 +72,11 @@ def assemble(
     beyond, reasons = None, list(config.get("ground_reasons", ()))
     if feet is not None:
         weight, forces = initial.weighed_kg * GRAVITY_M_S2, arrays["foot_wrench"]
-        beyond = impossible(feet, forces, recording.time, weight, initial.feet.values())
+        soles = list(initial.feet.values())
+        beyond = impossible(feet, forces, recording.time, weight, soles)
         beyond &= ~np.isin(arrays["tracking"], [TRACKING.index(word) for word in NO_ESTIMATE])
         if beyond.any():
-            reasons.append(impossible_in_words(beyond, feet, forces, recording.time, weight))
+            reasons.append(impossible_in_words(beyond, feet, forces, recording.time, weight, soles))
             notes = [*notes, reasons[-1]]
     data = with_sources(
         whole,

@@ -35,8 +35,8 @@ def impossible(feet: ContactLoads, wrench: Array, time: Array, weight: float, so
     Args:
         wrench: (T, C, 6) of the contacts, as estimated. soles: segments on which the ground acts.
     """
-    grounded = np.array([segment in soles for segment in feet.segments])
-    derived = ~np.isin(feet.contact, (NO_CONTACT, ON_PLATE)) & grounded
+    grounded = _grounded(feet, soles)
+    derived = _derived(feet, soles)
     step = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
     flies = widened((feet.contact[:, grounded] == NO_CONTACT).all(axis=1), int(ALOFT_S / step))
     size = np.linalg.norm(wrench[..., :3], axis=2) / weight
@@ -48,13 +48,25 @@ def impossible(feet: ContactLoads, wrench: Array, time: Array, weight: float, so
     return np.asarray(widened(found, round(AROUND_S / step)) & some)
 
 
-def impossible_in_words(frames: Flags, feet: ContactLoads, wrench: Array, time: Array, weight: float) -> str:
+def impossible_in_words(
+    frames: Flags, feet: ContactLoads, wrench: Array, time: Array, weight: float, soles: Collection[str]
+) -> str:
     """A warning on these frames (T,), some of which there are; it names no plate, because none is to blame."""
-    derived = frames[:, None] & ~np.isin(feet.contact, (NO_CONTACT, ON_PLATE))
+    derived = frames[:, None] & _derived(feet, soles)
     push = np.where(derived, wrench[..., 1], 0.0) / weight
     spans = listed([f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(frames)], 4)
     return (
-        f"Warning: where a foot's force follows from the motion it is no ground's ({push.min():.1f} to "
+        f"Warning: no ground gives a foot the force that follows from the motion ({push.min():.1f} to "
         f"{push.max():.1f} times the weight): from {spans} such forces, and the moments that rest on them, are absent. "
         "Look there for markers that jump, and check the recording's rate and the mass."
     )
+
+
+def _grounded(feet: ContactLoads, soles: Collection[str]) -> Flags:
+    """(C,) contacts on which the ground acts."""
+    return np.array([segment in soles for segment in feet.segments], dtype=bool)
+
+
+def _derived(feet: ContactLoads, soles: Collection[str]) -> Flags:
+    """(T, C) feet whose force no plate measures."""
+    return np.asarray(~np.isin(feet.contact, (NO_CONTACT, ON_PLATE)) & _grounded(feet, soles))

@@ -55,6 +55,8 @@ VIGOROUS, FOLLOWS, UPRIGHT = 0.04, 0.95, (0.8, 1.25)
 straight line of what the movement needs (correlation), and where nothing accelerates is about the weight (of who rises
 from a chair it is less, and anything comes out)."""
 _HALF_STRIDE_S = 0.4
+SLOWEST_HZ = 30.0
+"""At 25 Hz a walk's accelerations by the markers are a quarter too small."""
 
 
 class Needed:
@@ -116,7 +118,7 @@ def fitting_rate(needed: Needed, force: Array) -> tuple[float, float] | None:
     """The rate, Hz, at which the accelerations by the markers would be those by the plates' sum (T, 3) N, and these
     over the former as they are; None where the rate fits, or nothing can be said."""
     judged, seconds = needed.judged(force), needed.judged_s(force)
-    if not needed.whole or not seconds >= _HALF_STRIDE_S:  # a rate that is NaN, too
+    if not needed.whole or not (seconds >= _HALF_STRIDE_S and needed.rate >= SLOWEST_HZ):  # a rate that is NaN, too
         return None
     upward = np.stack([needed.force[:, 1] - needed.weight, force[:, 1]], axis=1)
     moved, carried = smoothed(np.where(judged[:, None], upward, 0.0), judged, needed.rate)[judged].T

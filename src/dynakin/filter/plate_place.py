@@ -11,7 +11,7 @@ from dynakin.bindings import _core
 from dynakin.filter.total_wrench import Ground
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.naming import listed
-from dynakin.results.records import OFF_RATE
+from dynakin.results.records import OFF_PLACE, OFF_RATE, WARNING
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -62,7 +62,7 @@ def off_place(
         found = {whole: found[whole]}
     said = [f"{name} by {np.hypot(*by):.2f} m (X {by[0]:+.2f}, Z {by[1]:+.2f})" for name, by in found.items()]
     return (
-        f"Warning: by the movement the force does not act where the plates have it: {listed(said)}, ground frame, "
+        f"{WARNING}{OFF_PLACE}: {listed(said)}, ground frame, "
         f"expected within {limit:.2f} m. Either the plates lie elsewhere than the file says (corners, origin, centres "
         "of pressure), or something else steadies the person."
     )

@@ -37,7 +37,8 @@ def with_taken(data: xr.Dataset, low_pass: LowPass, systematic: Systematic | Non
     Args:
         systematic: gives what moments change by; those of a model that is fixed in the ground stay.
     """
-    text = f"{LOW_PASSED} about {low_pass.cutoff_hz:.0f} Hz: nothing of the cameras' noise is left above"
+    cutoff = f"{low_pass.cutoff_hz:.0f} Hz"
+    text = f"{LOW_PASSED} about {cutoff}, or were computed by a model: nothing of the cameras' noise is left above"
     if low_pass.cutoff_hz > HIGH_HZ:
         return data, f"{sentence(text)}. That takes little but of impacts."
     lost = _taken(values_of(data, "coordinates"), low_pass)
@@ -53,11 +54,14 @@ def with_taken(data: xr.Dataset, low_pass: LowPass, systematic: Systematic | Non
     if share[k] > MATTERS:
         hold = "and deviations were widened by as much"
         if low_pass.cutoff_hz < TOO_LOW_HZ:
-            hold = "and more than can be told from what is left: speeds, accelerations and moments are too small"
+            hold = (
+                "and more than can be told from what is left: deviations of speeds, accelerations and of the moments "
+                "that rest on these are too small, whatever else is said of them"
+            )
         name = words(str(data["coordinate"].values[k]))
-        text = f"Warning: {text}. It took some {np.degrees(speed[k]):.0f} deg/s of {name}, {hold}."
+        text = f"Warning: {text}. The filter took some {np.degrees(speed[k]):.0f} deg/s of the speed of {name}, {hold}."
     else:
-        text = f"{sentence(text)}. It took little of this movement."
+        text = f"{sentence(text)}. The filter took little of this movement."
     wider = {
         f"{block}_sd": (("time", "coordinate"), np.where(sd > 0.0, np.hypot(sd, size), sd))
         for block, sd, size in zip(BLOCKS, said, sizes, strict=False)

@@ -30,6 +30,7 @@ from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.force_unit import likely_unit
 from dynakin.recordings.plates.pressure import LOADED_N
@@ -123,13 +124,17 @@ def known_ground(
         return Ground(loads, np.zeros(n, dtype=bool), may, False, None, (text,), (text,)), wrench
     # steps off the plates: their mean load is no mass
     mass = None if initial.feet else initial.weighed_kg
-    steps_kg = initial.weighed_kg if initial.feet else None
+    steps_kg = initial.weighed_kg if initial.feet and not initial.contacts else None
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads, steps_kg)
     if check.refusal:
         raise RecordingError(f"{recording.plates_file}: {check.refusal}")
     if check.unused:
         ground, nothing = known_ground(recording.with_plates(()), initial, markers, np.full_like(wrench, np.nan))
-        return replace(ground, notes=(*check.messages, *ground.notes)), nothing
+        none_on = ground.loads
+        if none_on is not None:
+            on = np.zeros((n, len(none_on.feet), len(recording.plates)), dtype=bool)
+            none_on = replace(none_on, on=on)
+        return replace(ground, loads=none_on, notes=(*check.messages, *ground.notes)), nothing
     off_rate = list[str]()
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
@@ -139,7 +144,8 @@ def known_ground(
         delay = None if in_step else plates_delay(needed, total)
         if delay is not None:
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
-        if (found := None if initial.contacts else fitting_rate(needed, total)) is not None:
+        found = None if initial.contacts else fitting_rate(needed, total)
+        if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
             off_rate = [f"{WARNING}{wrong_rate_in_words(needed.rate, *found)}"]
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
     judged = _judged(recording, initial, markers, wrench, loads, check, may, by_plate, tolerance)

@@ -14,7 +14,7 @@ from dynakin.recordings.feet.contact import NEAR_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.plates.force_unit import CONVERT, STEPPING_S, likely_unit, unit_of_steps, while_loaded
+from dynakin.recordings.plates.force_unit import CONVERT, STEPPING_S, likely_unit, while_loaded
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.plates.surfaces import SHOE_M
@@ -30,7 +30,7 @@ m g."""
 MASS_RATIO_REFUSED = (0.2, 5.0)
 """Plates' mass over declared mass beyond which the units or plates must be wrong; of who steps also beyond
 `MASS_RATIO_OF_UNIT` where a unit explains it."""
-MASS_RATIO_OF_UNIT = (0.5, 2.0)
+MASS_RATIO_OF_UNIT = (0.35, 2.0)
 _NO_LOAD = f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N"
 COP_REFUSED_M = 0.30
 """Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
@@ -118,12 +118,9 @@ def check_plates(
     frames = standing if standing is not None else slice(None)
     places = _feet(recording, ground, foot_markers or {}, findings)
     feet = {foot: place[:, :, [0, 2]] for foot, place in places.items()}
-    if mass_kg is None and (idle := _idle(recording, ground, feet)):
+    if mass_kg is None and (idle := _idle(recording, ground, feet, steps_kg)):
         findings.messages.append(idle)
-        unused = idle.startswith("Warning")
-        unit = unit_of_steps(recording, ground, steps_kg) if unused else ""
-        refusal = f"{_NO_LOAD}. {CONVERT.format(unit)}" if unit else None
-        return PlateCheck(None, None, tuple(findings.messages), refusal, unused=unused)
+        return PlateCheck(None, None, tuple(findings.messages), None, unused=idle.startswith("Warning"))
     mass = _check_vertical(recording, ground, mass_kg, steps_kg, standing, findings)
     if loads is None:
         loads = foot_loads(recording, ground, foot_markers or {})
@@ -165,7 +162,7 @@ def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame
     return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
 
 
-def _idle(recording: Recording, ground: GroundFrame, feet: Mapping[str, Array]) -> str:
+def _idle(recording: Recording, ground: GroundFrame, feet: Mapping[str, Array], steps_kg: float | None) -> str:
     """A sentence on plates none of which is ever loaded, a warning unless their corners and the feet (T, K, 2) show
     that nobody steps on them: under a foot they are dead, or in another unit. Empty where one is loaded."""
     pushes = [np.nan_to_num(ground.vectors_to_ground(plate.force)[:, 1]) for plate in recording.plates]
@@ -174,10 +171,12 @@ def _idle(recording: Recording, ground: GroundFrame, feet: Mapping[str, Array]) 
         return ""
     if len(feet) > 1 and all(_beside(plate, ground, feet) for plate in recording.plates):
         return "Nobody steps on the plates: they carry nothing, and no foot is on any."
+    unit = likely_unit(while_loaded(np.sum(pushes, axis=0)), steps_kg)
+    perhaps = f", and whether they are in {unit}, not N" if unit else ""
     return (
         f"Warning: the plates carry nobody in this recording (they read {most:.1f} N at most): it is run as one "
         "without plates, and the ground reaction follows from the motion. If somebody steps on them, look whether "
-        "their channels were connected and which unit they are in, or give the forces in N (--forces)."
+        f"their channels were connected{perhaps}."
     )
 
 
@@ -241,7 +240,7 @@ def _check_vertical(
             ", and this model needs it; give the forces of the plates that were stood on (--forces), or take --model "
             "fullbody, which does without"
         )
-        findings.refuse(f"{_NO_LOAD}. {CONVERT.format(unit)}" if unit else _NO_LOAD + needed)
+        findings.refuse(f"{_NO_LOAD}. {CONVERT.format(unit)}" if unit else _NO_LOAD + needed * (steps_kg is None))
         return None
     mean = loaded.mean(axis=0)
     vertical = float(mean[1])

@@ -170,10 +170,11 @@ def begin(
         said.append(f"Lengths, marker places and masses go on from {len(known)} saved values.")
     usable = True
     if standing.plates:
-        if max(np.nan_to_num(np.abs(plate.force)).max() for plate in standing.plates) < JUDGED_N:
+        if _most_force(standing) < JUDGED_N:
             return tracker, [*said, "Nobody stands on the plates yet; they are not checked."], usable
+        loaded = static is not None and _most_force(static) >= JUDGED_N
         check = check_plates(
-            static if static is not None and static.plates else standing,
+            static if static is not None and loaded else standing,
             initial.ground,
             None if initial.feet else initial.weighed_kg,
             initial.foot_markers,
@@ -194,6 +195,11 @@ def begin(
             doubt = doubtful_mass(np.zeros((0, 6)), initial.weighed_kg, ratio, initial.unseen_kg)
             said += [doubt] if doubt else []
     return tracker, said, usable
+
+
+def _most_force(recording: Recording) -> float:
+    """The largest component that a plate reads, N; 0 without plates."""
+    return max((float(np.nan_to_num(np.abs(plate.force)).max()) for plate in recording.plates), default=0.0)
 
 
 def _continued(initial: CalibratedModel, known: Mapping[str, tuple[float, float]]) -> CalibratedModel:

@@ -74,7 +74,7 @@ def check_standing(landmarks: Mapping[str, Array], name: str, *, given: bool) ->
         return []
     of = "against the vertical" if worst.endswith("thigh") else "bent"
     said = f"{NOT_UPRIGHT} {name}: the {worst} is {bent[worst]:.0f} deg {of}"
-    if given and min(bent["right knee"], bent["left knee"]) > SITS_DEG:
+    if given and all(bent[knee] > SITS_DEG for knee in ("right knee", "left knee")):
         raise ModelError(f"{said}, expected a standing trial of the person upright with straight knees (--static)")
     return [
         f"Warning: {said}, and places of markers measured there are off where the legs are straight. Give a standing "

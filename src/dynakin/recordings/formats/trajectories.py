@@ -33,6 +33,8 @@ _LINE_FRAMES, _LINE_S, _LINE_M = 8, 0.08, 0.01
 """How long and how far such a line is at least."""
 _MOST_REPEATED = 0.2
 """Part of the frames that may repeat others: more is another rate, written as this one."""
+_EVEN = 0.2
+"""Part of a step by which times may scatter for a jump of all markers to be one of frames."""
 _TWICE, _ALL_ALIKE = 1.6, 0.3
 """Times as far as expected from which frames are missing between two, and part of that by which markers may differ: no
 recording of ours has more than 1.13 where somebody moves, and a frame that is taken out gives 1.97 to 2.06."""
@@ -239,10 +241,14 @@ def _repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
 
 def _left_out(markers: Array, time: Array) -> list[str]:
     """A warning of frames that were dropped and the times numbered on: all markers move between two frames as far as in
-    several, by a cubic through their steps before and after."""
+    several, by a cubic through their steps before and after. Where the times are uneven, or scatter, these are not
+    numbered on."""
     if len(time) < 6:
         return []
-    step = np.diff(markers, axis=0) / np.diff(time)[:, None, None]
+    dt = np.diff(time)
+    usual = float(np.median(dt))
+    even = np.lib.stride_tricks.sliding_window_view(np.abs(dt - usual) < _EVEN * usual, 5).all(axis=1)
+    step = np.diff(markers, axis=0) / usual
     expected = (4.0 * (step[1:-3] + step[3:-1]) - step[:-4] - step[4:]) / 6.0
     found = step[2:-2]
     both = np.isfinite(found) & np.isfinite(expected)
@@ -252,7 +258,7 @@ def _left_out(markers: Array, time: Array) -> list[str]:
     times = (found * expected).sum(axis=(1, 2)) / np.maximum(size, 1e-12)
     apart = np.sqrt(np.square(found - times[:, None, None] * expected).sum(axis=(1, 2)) / np.maximum(size, 1e-12))
     moves = np.sqrt(size / seen) > _MOVES_M_S
-    jumps = np.flatnonzero(moves & (seen >= _ENOUGH) & (times > _TWICE) & (apart < _ALL_ALIKE * times))
+    jumps = np.flatnonzero(even & moves & (seen >= _ENOUGH) & (times > _TWICE) & (apart < _ALL_ALIKE * times))
     if not len(jumps):
         return []
     listed = [f"{k + 3} and {k + 4} ({time[k + 2]:.3f} s, as in {times[k]:.0f})" for k in jumps[:4]]

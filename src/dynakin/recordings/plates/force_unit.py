@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
-from dynakin.recordings.frame import GroundFrame
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Array
 from dynakin.units import GRAVITY_M_S2
 
 UNIT_WITHIN = 0.2
 """A mean load is that of a unit to this part of it: strides that are not whole make no more."""
 CONVERT = "The forces are probably in {}: convert them to N in the file"
 STEPPING_S = 0.3
-"""How long all feet that stand must be on plates for the load of who steps to be judged, and a plate be loaded, and
-then not, for it to be stepped on."""
+"""How long all feet that stand must be on plates for the load of who steps to be judged."""
 
 
 def likely_unit(load: float, mass_kg: float | None = None) -> str:
@@ -26,19 +22,6 @@ def likely_unit(load: float, mass_kg: float | None = None) -> str:
         units += [(name, mass_kg * GRAVITY_M_S2 / one) for name, one in newtons]
     fits = [name for name, of_one in units if abs(load / of_one - 1.0) < UNIT_WITHIN]
     return " or ".join(fits)
-
-
-def unit_of_steps(recording: Recording, ground: GroundFrame, mass_kg: float | None) -> str:
-    """The unit in which somebody steps onto one of the plates and off it; "" where nobody does: an idle plate's offset
-    has no steps."""
-    pushes = [np.nan_to_num(ground.vectors_to_ground(plate.force)[:, 1]) for plate in recording.plates]
-
-    def lasts(flags: npt.NDArray[np.bool_]) -> bool:
-        return any(end - first >= STEPPING_S * recording.rate for first, end in runs(flags))
-
-    if not any(lasts(push > 0.2 * push.max()) and lasts(push < 0.05 * push.max()) for push in pushes):
-        return ""
-    return likely_unit(while_loaded(np.sum(pushes, axis=0)), mass_kg)
 
 
 def while_loaded(push: Array) -> float:

@@ -16,6 +16,7 @@ from dynakin.results.records import (
     MISPLACED,
     NEVER_FLAT,
     NOT_UPRIGHT,
+    OFF_PLACE,
     OFF_RATE,
     REFUSED,
     WARNING,
@@ -48,7 +49,10 @@ ADVICE = {
     "its own.",
     "ankles": "Give a standing trial (--static), or take these ankles' angles by their changes alone.",
     "upright": "Record the person standing upright with straight knees, and give that (--static).",
-    "low-passed": "Export the markers without a filter (raw), and run them; of these use angles of slow movements.",
+    "low-passed": "Export the markers without a filter (raw), and run them; of these use angles, and the moments of "
+    "legs on plates.",
+    "place": "Correct where the file has the plates (corners, origin, centres of pressure), or declare what else "
+    "steadies the person (--contact).",
     "rate": "Look at which rate the cameras recorded, and whether the files say so.",
     "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
 }
@@ -93,6 +97,7 @@ def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
         ("Standing posture", "upright", lambda text: text.startswith(NOT_UPRIGHT)),
         ("Low-passed markers", "low-passed", lambda text: text.startswith(LOW_PASSED)),
         ("Rate", "rate", lambda text: text.startswith(OFF_RATE)),
+        ("Plates' place", "place", lambda text: text.startswith(OFF_PLACE)),
         ("Force plates", "plates", lambda text: "plate" in text),
         ("Recording", "recording", lambda text: True),
     ):
