@@ -121,6 +121,8 @@ def test_a_planar_model_is_checked_as_it_runs(tmp_path: Path, capsys: Said) -> N
     trial.write_text("nothing")
     assert main(["check", *options]) == 1
     assert main(["check", *options, "--side", "middle"]) == 2
+    for missing in ("--forces", "--static"):
+        assert main(["check", options[0], missing, str(tmp_path / "none.trc")]) == 2
 
 
 def test_run_names_what_lies_next_to_a_recording(data_dir: Path, tmp_path: Path, capsys: Said) -> None:

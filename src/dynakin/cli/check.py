@@ -37,7 +37,8 @@ def check(
         with stage("reading the recording"):
             case = case_of(settings)
     except (RecordingError, ModelError) as error:
-        if not is_file(Path(trial)):
+        named = (trial, settings.forces, settings.static)
+        if not all(is_file(Path(file)) for file in named if file):
             raise
         raise _refused(error) from None
     console.print(f"{case.recording.path or case.recording.name}", style="bold", soft_wrap=True)

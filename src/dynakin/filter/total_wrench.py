@@ -130,11 +130,10 @@ def known_ground(
         raise RecordingError(f"{recording.plates_file}: {check.refusal}")
     if check.unused:
         ground, nothing = known_ground(recording.with_plates(()), initial, markers, np.full_like(wrench, np.nan))
-        none_on = ground.loads
-        if none_on is not None:
-            on = np.zeros((n, len(none_on.feet), len(recording.plates)), dtype=bool)
-            none_on = replace(none_on, on=on)
-        return replace(ground, loads=none_on, notes=(*check.messages, *ground.notes)), nothing
+        loads = ground.loads
+        if loads is not None:  # the recording keeps its plates, with nobody on any
+            loads = replace(loads, on=np.zeros((n, len(loads.feet), len(recording.plates)), dtype=bool))
+        return replace(ground, loads=loads, notes=(*check.messages, *ground.notes)), nothing
     off_rate = list[str]()
     if loads is not None:
         needed = Needed(initial, recording.time, markers)

@@ -236,11 +236,15 @@ def _check_vertical(
     loaded = loaded[np.isfinite(loaded).all(axis=1)]
     if not len(loaded):
         unit = likely_unit(while_loaded(total[:, 1]), mass_kg or steps_kg)
-        needed = (
-            ", and this model needs it; give the forces of the plates that were stood on (--forces), or take --model "
-            "fullbody, which does without"
-        )
-        findings.refuse(f"{_NO_LOAD}. {CONVERT.format(unit)}" if unit else _NO_LOAD + needed * (steps_kg is None))
+        action = ""
+        if unit:
+            action = f". {CONVERT.format(unit)}"
+        elif steps_kg is None:
+            action = (
+                ", and this model needs it; give the forces of the plates that were stood on (--forces), or take "
+                "--model fullbody, which does without"
+            )
+        findings.refuse(_NO_LOAD + action)
         return None
     mean = loaded.mean(axis=0)
     vertical = float(mean[1])
