@@ -1,5 +1,5 @@
 """What all share of arrays: runs of true values, peaks, angles within a turn, vectors' products, wrenches about another
-point, means of what is known; no gaps, and no infinities, which no file may have."""
+point, means of what is known, samples by their neighbours; no gaps, and no infinities, which no file may have."""
 
 from __future__ import annotations
 
@@ -55,6 +55,12 @@ def cross(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> npt.NDArray
     hundred vectors of a movement."""
     turned = a * b.take(_NEXT, -1) - a.take(_NEXT, -1) * b
     return np.asarray(turned.take(_NEXT, -1))
+
+
+def by_neighbours(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """(T - 4, ...) what each sample but two on either side of (T, ...) would be by the cubic through the two before it
+    and the two behind it; NaN where one of these is missing."""
+    return np.asarray((4.0 * (values[1:-3] + values[3:-1]) - values[:-4] - values[4:]) / 6.0)
 
 
 def filled(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -28,7 +28,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import nearly_singular
 from dynakin.results.measures.sources import MEASURED
-from dynakin.results.records import NO_ESTIMATE, TRACKING, Timing
+from dynakin.results.records import NO_ESTIMATE_CODES, Timing
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
 
@@ -74,7 +74,7 @@ def assemble(
         weight, forces = initial.weighed_kg * GRAVITY_M_S2, arrays["foot_wrench"]
         soles = list(initial.feet.values())
         beyond = impossible(feet, forces, recording.time, weight, soles)
-        beyond &= ~np.isin(arrays["tracking"], [TRACKING.index(word) for word in NO_ESTIMATE])
+        beyond &= ~np.isin(arrays["tracking"], NO_ESTIMATE_CODES)
         if beyond.any():
             reasons.append(impossible_in_words(beyond, feet, forces, recording.time, weight, soles))
             notes = [*notes, reasons[-1]]

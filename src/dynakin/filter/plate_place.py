@@ -42,12 +42,12 @@ def off_place(
         return ""
     limit = OFF_PLACE_M + OFF_UNSEEN_M * initial.unseen_kg / initial.weighed_kg
     inertia = [k for k, name in enumerate(initial.names) if name.startswith("inertia/")]
+    posed = states.copy()
+    posed[:, inertia] = initial.x0[inertia]
     apart = np.full((len(measured), 2), np.nan)
     known = np.isfinite(states).all(axis=1) & np.isfinite(measured).all(axis=1)
     for k in np.flatnonzero(known & (measured[:, 1] > BEARS * weight)):
-        x = states[k].copy()
-        x[inertia] = initial.x0[inertia]
-        needed = _core.wrench(model, x)
+        needed = _core.wrench(model, posed[k])
         if needed[1] > BEARS * weight:
             apart[k] = _pressed(measured[k]) - _pressed(needed)
     bears = np.isfinite(apart).all(axis=1)

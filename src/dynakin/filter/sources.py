@@ -64,8 +64,8 @@ def with_sources(
     segments = [str(name) for name in data["joint_segment"].values]
     parents = data["joint_parent"].values
     moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
+    blind = np.isnan(values_of(data, "wrench_measured")).all(axis=1)
     if feet is None:
-        blind = np.isnan(values_of(data, "wrench_measured")).all(axis=1)
         joints = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(segments)))
         moments = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
@@ -73,8 +73,7 @@ def with_sources(
         contacts = _contacts(feet, undeclared, unmarked)
         if impossible is not None:
             contacts[impossible[:, None] & (contacts != MEASURED)] = ABSENT
-            blind = impossible & np.isnan(values_of(data, "wrench_measured")).all(axis=1)
-            believed = xr.DataArray(~blind, dims="time")
+            believed = xr.DataArray(~(impossible & blind), dims="time")
             found |= {name: data[name].where(believed) for name in ("wrench_estimated", "wrench_sd") if name in data}
         there = xr.DataArray(contacts != ABSENT, dims=("time", "foot"))
         found["foot_source"] = (("time", "foot"), contacts)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms
 from dynakin.filter.reported_sd import BLOCKS
 from dynakin.filter.systematic import Systematic
 from dynakin.recordings.low_passed import LowPass
@@ -47,7 +48,7 @@ def with_taken(data: xr.Dataset, low_pass: LowPass, systematic: Systematic | Non
     sizes = [low_pass.size(values) for values in lost]
     said = [values_of(data, f"{block}_sd") for block in BLOCKS]
     turns = np.asarray(data["coordinate_type"].values == "rotation")
-    speed, speed_sd = _rms(sizes[1]), _rms(said[1])
+    speed, speed_sd = rms(sizes[1], axis=0), rms(said[1], axis=0)
     judged = turns & (speed_sd > 0.0)  # what is held still has none
     share = np.divide(speed, speed_sd, out=np.zeros_like(speed), where=judged)
     k = int(np.argmax(share))
@@ -76,10 +77,3 @@ def _taken(q: Array, low_pass: LowPass) -> list[Array]:
         return [np.zeros_like(q)] * 3
     whole = np.column_stack([np.interp(at, at[known], column[known]) for column in q.T])
     return [low_pass.taken(whole, derivative) for derivative in range(3)]
-
-
-def _rms(values: Array) -> Array:
-    """(C,) over time, of what is known."""
-    known = np.isfinite(values)
-    total = np.square(np.where(known, values, 0.0)).sum(axis=0)
-    return np.asarray(np.sqrt(total / np.maximum(np.count_nonzero(known, axis=0), 1)))

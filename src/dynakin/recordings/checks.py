@@ -31,7 +31,6 @@ MASS_RATIO_REFUSED = (0.2, 5.0)
 """Plates' mass over declared mass beyond which the units or plates must be wrong; of who steps also beyond
 `MASS_RATIO_OF_UNIT` where a unit explains it."""
 MASS_RATIO_OF_UNIT = (0.35, 2.0)
-_NO_LOAD = f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N"
 COP_REFUSED_M = 0.30
 """Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
 be wrong. From `NEAR_M` on it is said."""
@@ -244,7 +243,7 @@ def _check_vertical(
                 ", and this model needs it; give the forces of the plates that were stood on (--forces), or take "
                 "--model fullbody, which does without"
             )
-        findings.refuse(_NO_LOAD + action)
+        findings.refuse(f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N{action}")
         return None
     mean = loaded.mean(axis=0)
     vertical = float(mean[1])

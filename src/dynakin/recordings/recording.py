@@ -62,9 +62,20 @@ def rate_of(time: Array) -> float:
     even = np.linspace(time[0], time[-1], len(time))
     if np.abs(time - even).max() < 0.1 * step:
         return float((len(time) - 1) / (time[-1] - time[0]))
-    k = np.arange(len(time)) - 0.5 * (len(time) - 1)
-    slope = float(k @ time / (k @ k))
-    return 1.0 / slope if scatters(time - time.mean() - slope * k, slope) else 1.0 / step
+    mean_step, off = even_step(time)
+    return 1.0 / mean_step if scatters(off, mean_step) else 1.0 / step
+
+
+def even_step(time: Array) -> tuple[float, Array]:
+    """Step of the even grid that lies nearest to times (T,) s, by least squares, and how far these lie off it (T,)."""
+    k = centred(len(time))
+    step = float(k @ time / (k @ k))
+    return step, time - time.mean() - step * k
+
+
+def centred(count: int) -> Array:
+    """Numbers of so many frames, from the middle one."""
+    return np.asarray(np.arange(count) - 0.5 * (count - 1), dtype=float)
 
 
 def scatters(off: Array, step: float) -> bool:

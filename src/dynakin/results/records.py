@@ -19,6 +19,8 @@ FOLLOWING = TRACKING.index("following")
 """Value of tracking where nothing is wrong."""
 NO_ESTIMATE = ("doubtful", "lost", "restarted")
 """Those of a frame whose numbers are no estimate."""
+NO_ESTIMATE_CODES = tuple(TRACKING.index(word) for word in NO_ESTIMATE)
+"""Their numbers."""
 MISPLACED = "markers lie"
 """How the warning begins of a model that does not fit the person."""
 NEVER_FLAT = "nothing shows the sole flat of "

@@ -172,9 +172,8 @@ def begin(
     if standing.plates:
         if _most_force(standing) < JUDGED_N:
             return tracker, [*said, "Nobody stands on the plates yet; they are not checked."], usable
-        loaded = static is not None and _most_force(static) >= JUDGED_N
         check = check_plates(
-            static if static is not None and loaded else standing,
+            static if static is not None and _most_force(static) >= JUDGED_N else standing,
             initial.ground,
             None if initial.feet else initial.weighed_kg,
             initial.foot_markers,

@@ -38,9 +38,9 @@ def first_cell(path: Path) -> str:
     return cells[0] if cells else ""
 
 
-def refuse_export(first_cell: str, path: Path) -> None:
-    """Raise RecordingError where a file begins as a camera system writes tables that no reader takes."""
-    if (what := _EXPORTS.get(first_cell.casefold())) is not None:
+def refuse_export(first: str, path: Path) -> None:
+    """Raise RecordingError where a file begins as a camera system's tables do, which no reader takes."""
+    if (what := _EXPORTS.get(first.casefold())) is not None:
         raise RecordingError(f"{path}: is {what}, expected the same trial exported as C3D (or TRC)")
 
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.recordings.recording import scatters
+from dynakin.arrays import by_neighbours
+from dynakin.recordings.recording import centred, even_step, scatters
 
 Array = npt.NDArray[np.float64]
 
@@ -18,8 +19,6 @@ _SCATTER = 0.02
 _ENOUGH = 20  # frames
 _SURE = 3.0
 """Standard errors by which what is decided is known."""
-_BESIDE = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0
-"""A cubic through two neighbours on each side, at the sample between."""
 
 
 def settled_times(time: Array, samples: Array, rate_in_header: float | None = None) -> tuple[Array, list[str]]:
@@ -45,9 +44,8 @@ def _grid(time: Array, rate_in_header: float | None) -> Array | None:
     near as can be told."""
     if len(time) < _ENOUGH or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         return None
-    k = np.arange(len(time)) - 0.5 * (len(time) - 1)
-    slope = float(k @ time / (k @ k))
-    left = time - time.mean() - slope * k
+    slope, left = even_step(time)
+    k = centred(len(time))
     error = float(np.sqrt(np.mean(np.square(left)) / (k @ k)))
     for rate in (rate_in_header, float(np.rint(1.0 / slope))):
         if rate and abs(1.0 / rate - slope) < _SURE * error:
@@ -63,9 +61,9 @@ def _stamped(off: Array, samples: Array, step: float) -> bool:
     of it that is there is 1 if the stamps are right, 0 if the grid is.
     """
     values = samples.reshape(len(samples), -1)
-    beside = _windows(values) @ (np.eye(5)[2] - _BESIDE)
+    beside = values[2:-2] - by_neighbours(values)
     speed = (values[4:] - values[:-4]) / (4.0 * step)
-    expected = speed * (_windows(off[:, None]) @ (np.eye(5)[2] - _BESIDE))
+    expected = speed * (off[2:-2] - by_neighbours(off))[:, None]
     known = np.isfinite(beside) & np.isfinite(expected)
     noise = np.square(np.where(known, beside, 0.0)).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     known &= np.square(step * speed) > noise  # four deviations of a speed that is noise alone
@@ -76,8 +74,3 @@ def _stamped(off: Array, samples: Array, step: float) -> bool:
     part = along.sum() / size.sum()
     error = np.sqrt(np.square(along - part * size).sum()) / size.sum()
     return bool(part + _SURE * error < 0.5)
-
-
-def _windows(values: Array) -> Array:
-    """(T - 4, K, 5) of (T, K)."""
-    return np.lib.stride_tricks.sliding_window_view(values, 5, axis=0)

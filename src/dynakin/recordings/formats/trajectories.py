@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import by_neighbours, runs
 from dynakin.errors import RecordingError
 from dynakin.recordings.recording import Array, rate_of
 from dynakin.units import length_factor
@@ -249,8 +249,7 @@ def _left_out(markers: Array, time: Array) -> list[str]:
     usual = float(np.median(dt))
     even = np.lib.stride_tricks.sliding_window_view(np.abs(dt - usual) < _EVEN * usual, 5).all(axis=1)
     step = np.diff(markers, axis=0) / usual
-    expected = (4.0 * (step[1:-3] + step[3:-1]) - step[:-4] - step[4:]) / 6.0
-    found = step[2:-2]
+    expected, found = by_neighbours(step), step[2:-2]
     both = np.isfinite(found) & np.isfinite(expected)
     found, expected = np.where(both, found, 0.0), np.where(both, expected, 0.0)
     seen = np.maximum(both.any(axis=2).sum(axis=1), 1)

@@ -14,7 +14,7 @@ from dynakin.results.estimate import AXES, Estimate, values_of
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
 from dynakin.results.measures.sources import ABSENT
 from dynakin.results.naming import listed, sentence
-from dynakin.results.records import NO_ESTIMATE, REFUSED, TRACKING, Tracking
+from dynakin.results.records import NO_ESTIMATE_CODES, REFUSED, Tracking
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -61,7 +61,7 @@ def tracking_of(estimate: Estimate) -> Tracking:
     lost = ((astray & ~refused).sum(axis=1) > np.maximum(USED_ASTRAY * n, 1.0)) | (astray.sum(axis=1) > ANY_ASTRAY * n)
     lost |= _limb_lost(estimate, seen, refused)
     if "tracking" in data:
-        lost |= np.isin(data["tracking"].values, [TRACKING.index(word) for word in NO_ESTIMATE])
+        lost |= np.isin(data["tracking"].values, NO_ESTIMATE_CODES)
     return Tracking(_bridged(lost, estimate.time), seen.any(axis=1), np.where(seen, distance, np.nan), refused)
 
 
