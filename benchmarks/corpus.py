@@ -25,6 +25,7 @@ from pages import put
 from source_digest import source_digest
 
 from dynakin.errors import DynakinError
+from dynakin.messages import about, from_attributes, warnings_of
 from dynakin.recordings.companions import STANDING_WORDS, companion_forces, companion_static
 from dynakin.recordings.frame import find_laboratory_frame
 from dynakin.recordings.read import read
@@ -111,12 +112,13 @@ def _outcome(row: Row) -> list[Any]:
     if not file.exists():
         return [*["–"] * 7, row.said.replace("|", "\\|")]
     metrics = json.loads(file.read_text(encoding="utf-8"))
-    messages = metrics["messages"]
-    chosen = next((text.split(":")[0].split()[-1] for text in messages if text.startswith("Marker set")), "–")
-    mass = next((text for text in messages if text.casefold().removeprefix("warning: ").startswith("mass ")), "")
+    with xr.open_dataset(row.folder / "estimate.nc") as data:
+        messages = from_attributes(data.attrs)
+    chosen = next((message.text.split(":")[0].split()[-1] for message in about(messages, "marker set")), "–")
+    mass = " ".join(message.text for message in about(messages, "mass"))
     legs = metrics["moments"]["legs"] if metrics["moments"] else {}
     counts = [" / ".join(str(n) for n in legs[side].values()) if side in legs else "–" for side in ("right", "left")]
-    said = row.said if row.code else "; ".join(_short(text) for text in messages if text.startswith("Warning"))
+    said = row.said if row.code else "; ".join(_short(message.text) for message in warnings_of(messages))
     rms = metrics["markers"]["mean_rms_mm"] if metrics["markers"] else None
     assert row.recording is not None
     return [
@@ -124,14 +126,13 @@ def _outcome(row: Row) -> list[Any]:
         f"{len(metrics['markers']['rms_mm']) if metrics['markers'] else '–'} of {len(row.recording.marker_names)}",
         "–" if rms is None else f"{rms:.1f}",
         next((word for part, word in _FROM.items() if part in mass), "–"),
-        sum(text.startswith("Segment") and ("locked" in text or "held" in text) for text in messages) or "–",
+        sum(": locked to " in message.text for message in about(messages, "calibration")) or "–",
         *counts,
         said.replace("|", "\\|"),
     ]
 
 
 def _short(text: str) -> str:
-    text = text.removeprefix("Warning: ")
     return text if len(text) <= 90 else f"{text[: text.rfind(' ', 0, 90)]} ..."
 
 

@@ -75,4 +75,4 @@ def _estimate(recording: Recording, static: Recording | None, settings: Mapping[
         return Run(None, error.message, [], 0.0)
     (estimate,) = estimates.values()
     data = estimate.data[[name for name in estimate.data if str(name).startswith(KEPT_STEMS)]].load()
-    return Run(Found(data, estimate.ground), "", list(estimate.messages), 0.0)
+    return Run(Found(data, estimate.ground), "", list(map(str, estimate.messages)), 0.0)

@@ -163,7 +163,7 @@ def _made(spec: Spec) -> Run:
     data = full_dataset(estimate).drop_vars([*LARGE], errors="ignore").drop_dims("element_", errors="ignore").load()
     before, after = LEFT_OUT[spec.motion]
     window = (estimate.time >= estimate.time[0] + before) & (estimate.time <= estimate.time[-1] - after)
-    return Run("", data, truth, window & ~estimate.lost, tuple(estimate.messages), found, 0.0)
+    return Run("", data, truth, window & ~estimate.lost, tuple(map(str, estimate.messages)), found, 0.0)
 
 
 LARGE = ("joint_orientations", "joint_loads", "initial_covariance", "final_covariance", "joint_centres")

@@ -12,6 +12,7 @@ import pytest
 
 from dynakin.cli.app import main
 from dynakin.cli.prepared import changed
+from dynakin.messages import note, warning
 from dynakin.results.files.markers import write_trc
 from dynakin.results.files.storage import write_storage
 from dynakin.simulation.trial import simulate
@@ -148,8 +149,8 @@ def test_run_says_what_was_cut_or_turned_and_nothing_of_every_file() -> None:
     markers = made.markers.copy()
     markers[-3:] = np.nan
     turned = "plate 1 stores the person's action, unlike the others: it is turned."
-    notes = ("Plates resampled from 10 samples a frame (zero-phase FIR low-pass).", "Warning: labels.", turned)
+    notes = (note("routine", "Plates resampled."), warning("recording", "labels."), note("plates", turned))
     blank = replace(made, markers=markers, notes=notes).without_empty_ends()
     said = changed(SimpleNamespace(recording=blank))  # type: ignore[arg-type]
     assert [topic for topic, _ in said] == ["Note", "Note"]
-    assert said[0][1] == turned and "the last 3 frames: they are left out" in said[1][1]
+    assert str(said[0][1]) == turned and "the last 3 frames: they are left out" in str(said[1][1])

@@ -95,7 +95,7 @@ def test_walking(data_dir: Path) -> None:
     # measured: hip 0.6, knee 1.9, ankle 4.5 (theirs has another subtalar axis, and turns about it by 9 to 12 deg more)
     assert max(away[name][judged].std() for name in LEGS) < 5.0
     assert max(away[name][judged].std() for name in OTHERS) < 6.0
-    assert any("left foot stands off the plates from 0.00" in text for text in estimate.messages)
+    assert any("left foot stands off the plates from 0.00" in text for text in map(str, estimate.messages))
     lost = np.isnan(estimate.data["wrench_measured"].values).all(axis=1)
     assert lost[0] and not lost[(recording.time > 0.3) & (recording.time < 1.15)].any()
 
@@ -119,4 +119,4 @@ def test_a_standing_trial_may_wear_more_markers(data_dir: Path) -> None:
     estimate, tracker = estimator.track(recording, static=static)
     judged = (recording.time >= 0.15) & (recording.time <= 1.20)
     plausible(tracker, estimate, judged)
-    assert any("standing from 0.00 to 5.16 s of static1" in text for text in estimate.messages)
+    assert any("standing from 0.00 to 5.16 s of static1" in text for text in map(str, estimate.messages))

@@ -131,7 +131,7 @@ def test_a_lean_near_the_singularity_is_said(data_dir: Path) -> None:
     data = estimate.data.copy(deep=True)
     data["coordinates"].loc[{"coordinate": "pelvis_list"}][7] = np.radians(-84.0)
     (said,) = nearly_singular(replace(estimate, data=data))
-    assert said.startswith("Warning: pelvis_list reaches -84 deg at 2.07 s") and "--forward" in said
+    assert str(said).startswith("Warning: pelvis_list reaches -84 deg at 2.07 s") and "--forward" in said.text
 
 
 def test_lost_frames_of_who_faces_off_x_stay_lost_and_lose_nothing_else(data_dir: Path, tmp_path: Path) -> None:

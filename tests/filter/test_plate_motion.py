@@ -16,8 +16,8 @@ from dynakin import Estimator, Subject, load_model
 from dynakin.errors import RecordingError
 from dynakin.filter.parameters import DELAY_UNSEEN_S, parameters_of
 from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
+from dynakin.messages import about
 from dynakin.recordings.recording import Plate, Recording
-from dynakin.results.records import OFF_RATE
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.held_out import measured_wrench
@@ -49,7 +49,7 @@ def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: f
     whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
     late = brought_into_step(whole, -delay_s)
     ready, before = person().prepare(late), person().prepare(whole)
-    text = next(text for text in ready.messages if "By the motion of the centre of mass" in text)
+    text = next(text for text in map(str, ready.messages) if "By the motion of the centre of mass" in text)
     side = "behind" if delay_s > 0.0 else "ahead of"
     (found,) = re.findall(rf"([0-9]+) ms {side} the markers", text)
     assert int(found) == pytest.approx(1000.0 * abs(delay_s), abs=2.0)
@@ -64,7 +64,7 @@ def test_plates_that_are_in_step_are_left_alone(data_dir: Path) -> None:
     for recording in (simulate("fullbody", "gait", 7, 4.0).recording, walk):
         ready = person().prepare(recording)
         assert plates_delay(Needed(ready.calibrated, recording.time, ready.markers), ready.wrench[:, :3]) is None
-        assert not any("into step" in text for text in ready.messages)
+        assert not any("into step" in text for text in map(str, ready.messages))
 
 
 @pytest.mark.parametrize(
@@ -191,7 +191,7 @@ def test_plates_off_their_place_are_told_by_the_movement(by_m: float, which: int
     up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
     pressed = walk.plates[0].cop[np.isfinite(walk.plates[0].cop).all(axis=1)]
     across = int(np.argmin(np.ptp(pressed, axis=0) + 9.0 * np.eye(3)[up]))
-    found = [text for text in person().run(shifted(walk, across, by_m, which)).messages if "does not act" in text]
+    found = [message.text for message in about(person().run(shifted(walk, across, by_m, which)).messages, "place")]
     assert len(found) == (said is not None)
     if said is not None:
         assert re.search(f"where the plates have it: {said} .X", found[0]) and "the plates lie elsewhere" in found[0]
@@ -202,7 +202,7 @@ def test_plates_of_a_real_walk_off_their_place(data_dir: Path, by_m: float, told
     folder = data_dir / "opencap_subject4"
     walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
     estimator = Estimator(load_model("fullbody", Subject(mass_kg=63.3, height_m=1.70)))
-    found = [text for text in estimator.run(shifted(walk, 0, by_m)).messages if "does not act" in text]
+    found = [message.text for message in about(estimator.run(shifted(walk, 0, by_m)).messages, "place")]
     assert len(found) == told
     assert not told or "(X +0.0" in found[0]
 
@@ -215,7 +215,7 @@ def faster(recording: Recording, factor: float) -> Recording:
 @pytest.mark.parametrize(("motion", "factor"), [("gait", 1.2), ("gait", 0.8), ("squat", 1.2), ("squat", 2.0)])
 def test_a_rate_that_does_not_fit_the_forces_is_told_with_one_that_would(motion: str, factor: float) -> None:
     whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
-    said = [text for text in person().prepare(faster(whole, factor)).messages if OFF_RATE in text]
+    said = [message.text for message in about(person().prepare(faster(whole, factor)).messages, "rate")]
     assert len(said) == 1 and f"at {100.0 * factor:.4g} Hz" in said[0] and "Correct the rate" in said[0]
     (fits,) = re.findall(r"About ([0-9.]+) Hz would fit", said[0])
     assert float(fits) == pytest.approx(100.0, abs=6.0)
@@ -226,7 +226,7 @@ def test_of_a_real_walk_the_rate_is_told_and_of_a_good_one_nothing(data_dir: Pat
     folder = data_dir / "opencap_subject4"
     walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
     for factor in (1.0, 1.2, 2.0):
-        said = [text for text in person().prepare(faster(walk, factor)).messages if OFF_RATE in text]
+        said = [message.text for message in about(person().prepare(faster(walk, factor)).messages, "rate")]
         assert len(said) == (factor != 1.0)
         assert not said or "Hz: by the plates" in said[0]
 
@@ -235,7 +235,7 @@ def test_of_a_real_walk_the_rate_is_told_and_of_a_good_one_nothing(data_dir: Pat
 def test_a_chair_is_no_wrong_rate(data_dir: Path, seconds: tuple[float, float]) -> None:
     folder = data_dir / "opencap_subject4"
     chair = dynakin.read(folder / "STS1.trc", folder / "STS1_grf.mot").window(*seconds)
-    assert not any(OFF_RATE in text for text in person().prepare(chair).messages)
+    assert not about(person().prepare(chair).messages, "rate")
 
 
 WEIGHT = 70.0 * GRAVITY_M_S2
@@ -262,7 +262,7 @@ def test_forces_in_a_unit_that_makes_them_next_to_nothing_are_not_used_and_the_u
     """An idle plate that drifts looks the same: the recording is run as one without plates."""
     walk = simulate("fullbody", "gait", 7, 4.0).recording
     ready = person().prepare(with_forces(walk, lambda force: force / one))
-    assert any("carry nobody" in text and f"in {unit}, not N" in text for text in ready.messages)
+    assert any("carry nobody" in text and f"in {unit}, not N" in text for text in map(str, ready.messages))
     assert not np.isfinite(ready.wrench).any()
 
 
@@ -270,7 +270,7 @@ def test_another_unit_of_the_forces_of_a_squat_is_named() -> None:
     """It is no reason to refuse: who sits all the time bears as little on the feet."""
     squat = simulate("fullbody", "squat", 7, 8.0).recording
     ready = person().prepare(with_forces(squat, lambda force: 100.0 / WEIGHT * force))
-    assert any("or the forces are in % of the body weight, not N" in text for text in ready.messages)
+    assert any("or the forces are in % of the body weight, not N" in text for text in map(str, ready.messages))
 
 
 def test_who_judges_takes_plates_in_step_too() -> None:

@@ -454,7 +454,11 @@ def test_a_skeleton_whose_markers_lie_elsewhere_has_centres_of_joints_that_are_a
         for state in (with_motion(x), with_motion(moved))
     ]
     assert (said[1]["moments"] >= said[0]["moments"]).all() and said[1]["moments"][-1] > 1.1 * said[0]["moments"][-1]
-    assert subject.misfit(x) == [] and "12 mm" in subject.misfit(moved)[0] and "2.4 times" in subject.misfit(moved)[0]
+    assert (
+        subject.misfit(x) == []
+        and "12 mm" in subject.misfit(moved)[0].text
+        and "2.4 times" in subject.misfit(moved)[0].text
+    )
     none = {kind: dict.fromkeys(BLOCKS, np.zeros((3, 1))) for kind in (*KINDS, "inertia")}
     centres = none | dict.fromkeys(("hinge_centre", "ball_centre"), dict.fromkeys(BLOCKS, np.ones((3, 1))))
     still, moved_m = dict.fromkeys(BLOCKS, np.zeros((3, 1))), SCALED.placed * np.array([0.5, 1.0, 3.0])

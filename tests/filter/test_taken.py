@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from dynakin.filter.estimator import Estimator
+from dynakin.messages import about
 from dynakin.model.definition import load_model
 from dynakin.recordings.resampling import low_pass
-from dynakin.report.findings.recording import warned
+from dynakin.report.findings.said import warned
 from dynakin.results.estimate import Estimate
-from dynakin.results.records import LOW_PASSED
 from dynakin.settings.subject import Subject
 from dynakin.simulation.trial import simulate
 
@@ -38,18 +38,17 @@ def estimate_and_held(cutoff_hz: float | None) -> tuple[Estimate, float]:
 def test_speeds_of_low_passed_markers_hold_the_truth() -> None:
     estimate, held = estimate_and_held(6.0)
     assert held > 0.85
-    assert any(text.startswith(f"Warning: {LOW_PASSED} about ") for text in estimate.messages)
-    assert [finding.title for finding in warned(estimate, {}) or []].count("Low-passed markers") == 1
+    assert [message.level for message in about(estimate.messages, "low-passed")] == ["warning"]
+    assert [finding.title for finding in warned(estimate, {})].count("Low-passed markers") == 1
 
 
 def test_raw_markers_are_left_alone() -> None:
     estimate, held = estimate_and_held(None)
     assert held > 0.80
-    assert not any(LOW_PASSED in text.lower() for text in estimate.messages)
+    assert not about(estimate.messages, "low-passed")
 
 
 @pytest.mark.parametrize("cutoff_hz", [20.0])
 def test_what_takes_little_is_no_warning(cutoff_hz: float) -> None:
     estimate, _ = estimate_and_held(cutoff_hz)
-    assert any(LOW_PASSED[1:] in text for text in estimate.messages)
-    assert not any(text.startswith(f"Warning: {LOW_PASSED}") for text in estimate.messages)
+    assert [message.level for message in about(estimate.messages, "low-passed")] == ["note"]

@@ -15,6 +15,7 @@ from dynakin.identification.change import change_between, change_in_words
 from dynakin.identification.decision import Decision, decide, parts_of
 from dynakin.identification.subject import Identification, identify_subject, warned
 from dynakin.identification.trials import measure_all
+from dynakin.messages import note, warning
 from dynakin.model.identified import IdentifiedSubject, read_identified, with_identified
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate
@@ -38,7 +39,7 @@ def test_a_subject_says_by_how_much_it_predicts_better(identified: Identificatio
     gain = 100.0 * (1.0 - (np.array(held_out.bodies) / np.array(held_out.table)).mean())
     assert f"predicted {gain:+.0f} % better (FX" in held_out.in_words()
     used = with_identified(case.common.initial, identified.subject.model_copy(update={"use": "bodies"}))
-    assert used.messages[-1].endswith(f"{held_out.in_words()}.")
+    assert str(used.messages[-1]).endswith(f"{held_out.in_words()}.")
     before = identified.subject.model_copy(update={"held_out": None})  # a file of an earlier version
     before.write(tmp_path / "subject.toml")
     assert read_identified(tmp_path / "subject.toml") == before
@@ -198,10 +199,11 @@ def test_another_person_and_other_markers_are_named(case: Case) -> None:
 
 def test_warnings_of_the_calibration_are_part_of_what_is_found(case: Case, identified: Identification) -> None:
     assert identified.warned == ()
-    doubtful = replace(case.common.initial, messages=("Warning: another person.", "Mass 70 kg: given."))
-    trial = replace(case.trials[0].movement, start=replace(doubtful, messages=("Warning: a leg is short.",)))
+    another, short = warning("calibration", "another person."), warning("calibration", "a leg is short.")
+    doubtful = replace(case.common.initial, messages=(another, note("mass", "Mass 70 kg: given.")))
+    trial = replace(case.trials[0].movement, start=replace(doubtful, messages=(short,)))
     said = warned(replace(case.common, initial=doubtful), [replace(case.trials[0], movement=trial)])
-    assert said == ("Warning: another person.", f"Warning: {case.sims[0].recording.name}: a leg is short.")
+    assert said == (another, short.of(case.sims[0].recording.name))
 
 
 def mislabelled(recording: Recording) -> Recording:
@@ -222,7 +224,8 @@ def test_a_trial_that_is_lost_is_left_out_and_a_lone_one_refused(case: Case) -> 
         identify_subject(estimator(), [lost, sitting], static=case.common.static)
     found = identify_subject(estimator(), [lost, squat, sitting], static=case.common.static)
     assert found.subject.trials == (squat.name, sitting.name)
-    assert found.lost == found.subject.report[:1] and "left out: " in found.lost[0] and "mislabelled" in found.lost[0]
+    (said,) = found.lost
+    assert str(said) == found.subject.report[0] and "left out: " in said.text and "mislabelled" in said.text
 
 
 def test_lost_frames_of_a_trial_that_is_followed_say_nothing_of_the_body(case: Case) -> None:

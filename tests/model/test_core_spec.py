@@ -85,7 +85,7 @@ def test_a_start_beyond_a_joint_limit_is_put_on_it_and_said() -> None:
     initial = load_model("sagittal7", PERSON).calibrate(recording)
     k = initial.names.index("ankle")
     assert initial.x0[k] == initial.upper[k] == pytest.approx(np.deg2rad(50.0))
-    assert any("Start of ankle" in message and "put on the bound" in message for message in initial.messages)
+    assert any("Start of ankle" in message and "put on the bound" in message for message in map(str, initial.messages))
 
 
 def test_the_specification_can_be_pickled(standing_person: Recording) -> None:

@@ -149,7 +149,7 @@ def test_what_is_written_loads_and_runs(tmp_path: Path, capsys: pytest.CaptureFi
     save_trial(replace(trial, recording=replace(trial.recording, marker_names=tuple(names))), tmp_path / "trial")
     file = next((tmp_path / "trial").glob("*.trc"))
     guessed = recognise(read(file))
-    assert guessed.messages[0].startswith("Warning: no marker set has these names")
+    assert str(guessed.messages[0]).startswith("Warning: no marker set has these names")
     assert guessed.match.names["KNE", "right"] == "Knie lateral rechts"
     assert guessed.match.names["HEE", "left"] == "Ferse links"
     draft = tmp_path / "mine.toml"
@@ -162,7 +162,7 @@ def test_what_is_written_loads_and_runs(tmp_path: Path, capsys: pytest.CaptureFi
     assert "exists already" in capsys.readouterr().err
     forces = str(next((tmp_path / "trial").glob("forces.mot")))
     assert main(["run", str(file), "--forces", forces, "-o", str(tmp_path / "guessed")]) == 0
-    assert "Warning: no marker set has these names" in capsys.readouterr().out
+    assert "Guessed marker places: No marker set has these names" in capsys.readouterr().out
     assert json.loads((tmp_path / "guessed" / "metrics.json").read_text())["marker_places"] == "guessed"
     assert 'marker_places = "guessed"' in (tmp_path / "guessed" / "config.toml").read_text()
     assert "Guessed marker places" in (tmp_path / "guessed" / "report.html").read_text(encoding="utf-8")

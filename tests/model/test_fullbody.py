@@ -127,7 +127,7 @@ def test_the_filter_follows_a_moving_body_at_any_heading_without_knowing_which()
         error = result.data["coordinates"].values[:, names.index(name)] - x[:, free.index(name)]
         assert np.rad2deg(np.sqrt(np.mean(error**2))) < 1.5, name
     assert np.isfinite(result.data["state"].values).all()
-    assert any("Both feet stand on plate 1" in text for text in result.messages)
+    assert any("Both feet stand on plate 1" in text for text in map(str, result.messages))
     assert not [event for event in result.events if event.kind == "reset"]
 
 
@@ -137,7 +137,7 @@ def test_without_plates_it_still_moves_and_says_so() -> None:
     trial = recording_of(initial, states(initial, squat(time), 0.0, np.zeros(3), time), time, plates=False)
     result = Estimator(definition(), vertical="+Y", estimate=["markers"]).run(trial, static=standing())
     assert np.isnan(result.data["wrench_measured"].values).all()
-    assert any("No force plates" in text for text in result.messages)
+    assert any("No force plates" in text for text in map(str, result.messages))
     assert any(event.kind == "missing" and event.subject == "plates" for event in result.events)
 
 

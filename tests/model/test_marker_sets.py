@@ -188,7 +188,7 @@ def test_joint_widths_of_the_recording_come_before_those_of_the_height(person: S
     plain = wearing(person, "plug-in-gait")
     given = {"knee_width_m_r": 0.120, "knee_width_m_l": 0.120, "ankle_width_m_r": 0.080}
     initial = measured(replace(plain, subject=given), "plug-in-gait")
-    assert any("right knee 120 mm" in said and "right ankle 80 mm" in said for said in initial.messages)
+    assert any("right knee 120 mm" in said and "right ankle 80 mm" in said for said in map(str, initial.messages))
     core = _core.Model(initial.spec)
     _, origins = _core.segment_poses(core, core.initial_state())
     places = dict(zip(initial.recorded_markers, _core.marker_positions(core, core.initial_state()), strict=True))

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError, RecordingError
+from dynakin.messages import Message
 from dynakin.model.definition import load_model
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import MarkerMatch, match_markers
@@ -105,8 +106,8 @@ def renamed(recording: Recording, spelt: Callable[[str], str]) -> Recording:
     return replace(recording, marker_names=tuple(spelt(name) for name in recording.marker_names))
 
 
-def warnings_of(messages: tuple[str, ...]) -> list[str]:
-    return [said for said in messages if said.startswith("Warning")]
+def warnings_of(messages: tuple[Message, ...]) -> list[str]:
+    return [str(message) for message in messages if message.level == "warning"]
 
 
 @pytest.mark.parametrize("name", WITH_LEGS)
@@ -114,7 +115,7 @@ def test_every_set_is_recognised_on_a_walking_person_and_nothing_is_found_wrong(
     recording, found = walking(name), recognised(name)
     assert found.match.marker_set.name == name
     assert not warnings_of(found.messages)
-    assert found.messages[0].startswith(f"Marker set {name}: {len(found.match.names)} of its ")
+    assert str(found.messages[0]).startswith(f"Marker set {name}: {len(found.match.names)} of its ")
     assert len(found.match.names) >= 0.95 * len(recording.marker_names)
 
 
@@ -149,7 +150,7 @@ def test_names_that_the_best_set_does_not_know_are_used_by_what_they_say(set_nam
     found = recognise(recording)
     assert found.match.marker_set.name == set_name
     assert found.match.names == names
-    assert "used by what their names say: " in found.messages[0] and "CLAV (CLAV)" in found.messages[0]
+    assert "used by what their names say: " in found.messages[0].text and "CLAV (CLAV)" in found.messages[0].text
     guesses = {name for name in names.values() if name.endswith("_met")}  # the others are names of some set
     assert set(found.match.guessed) == guesses
     said = warnings_of(found.messages)
@@ -258,7 +259,7 @@ def test_exchanges_that_share_a_marker_are_said_one_by_one() -> None:
         left = match
         for pair in pairs:
             left, said = _without_swap(left, Swap((pair,), "they", "far apart"), 0.0)
-            assert "they look swapped" in said
+            assert "they look swapped" in said.text
         assert ("THI", "left") not in left.names and ("KNE", "left") not in left.names
 
 
@@ -305,7 +306,7 @@ def test_one_marker_that_is_off_for_a_while_is_no_exchange(name: str) -> None:
         markers = recording.markers.copy()
         away = np.random.default_rng(seed).standard_normal(3)
         markers[40:70, recording.marker_names.index(name)] += 0.12 * away / np.linalg.norm(away)
-        assert not any("swapped" in said for said in recognise(replace(recording, markers=markers)).messages)
+        assert not any("swapped" in said for said in map(str, recognise(replace(recording, markers=markers)).messages))
 
 
 def test_without_what_is_exchanged_there_is_no_person() -> None:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
+from dynakin.messages import about
 from dynakin.model.calibration.checks import check_standing
 from dynakin.model.definition import load_model
 from dynakin.recordings.recording import Recording
-from dynakin.results.records import NOT_UPRIGHT, warnings_of
 from dynakin.settings.subject import Subject
 from dynakin.simulation.trial import simulate
 
@@ -31,8 +31,9 @@ def test_who_stands(knee: float, thigh: float) -> None:
 
 @pytest.mark.parametrize(("knee", "thigh", "said"), [(45.0, 22.0, "knee is 45 deg bent"), (20.0, 40.0, "thigh is 40")])
 def test_who_stands_with_bent_legs(knee: float, thigh: float, said: str) -> None:
-    (text,) = check_standing(legs(knee, thigh), "static", given=True)
-    assert text.startswith(f"Warning: {NOT_UPRIGHT} static") and said in text and text.count("--static") == 1
+    (found,) = check_standing(legs(knee, thigh), "static", given=True)
+    assert (found.topic, found.level) == ("standing", "warning")
+    assert said in found.text and found.text.count("--static") == 1
 
 
 def test_who_sits_is_refused_as_standing_trial_only() -> None:
@@ -55,4 +56,4 @@ def test_a_squat_is_no_standing_trial() -> None:
     with pytest.raises(ModelError, match="nobody stands upright in held"):
         definition.calibrate(squat, static=held(squat, int(np.argmin(pelvis))))
     upright = definition.calibrate(squat, static=held(squat, 20))
-    assert not [text for text in warnings_of(upright.messages) if NOT_UPRIGHT in text]
+    assert not about(upright.messages, "standing")

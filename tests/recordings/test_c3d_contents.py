@@ -26,7 +26,7 @@ BODY = {"LASI": place(0.1, 0.1, 1.0), "RASI": place(0.1, -0.1, 1.0), "LHEE": pla
 
 
 def notes(path: Path) -> str:
-    return " ".join(read(path).notes)
+    return " ".join(map(str, read(path).notes))
 
 
 # --- points
@@ -52,7 +52,7 @@ def test_axes_and_centres_of_mass_are_no_markers(tmp_path: Path) -> None:
     groups = {"POINT": {"MODELED_MARKERS": ["CentreOfMass", "LKNE"], "TYPE_GROUPS": ["MODELED_MARKERS", "X"]}}
     recording = read(made_c3d(tmp_path / "a.c3d", points, groups))
     assert recording.marker_names == (*BODY, "LKNE")
-    said = " ".join(recording.notes)
+    said = " ".join(map(str, recording.notes))
     assert "8 ends of segments' axes are no markers and left out: S:PELO-A-L-P, FEMUR_O-X-Y-Z." in said
     assert "Computed centre of mass is no marker and left out: CentreOfMass, CentreOfMassFloor." in said
 
@@ -102,7 +102,7 @@ def test_doubled_names(tmp_path: Path, second: str, names: tuple[str, ...], said
     pairs += [("LHEE", one), ("LHEE", other)] if first else [("LHEE", other), ("LHEE", one)]
     recording = read(made_c3d(tmp_path / "a.c3d", pairs))
     assert set(recording.marker_names) == {"LASI", "RASI", "C7", *names}
-    assert any("'LHEE' is in the file 2 times" in note and said in note for note in recording.notes)
+    assert any("'LHEE' is in the file 2 times" in note and said in note for note in map(str, recording.notes))
     if "LHEE" in names:
         np.testing.assert_allclose(recording.marker("LHEE"), 1e-3 * BODY["LHEE"], atol=5e-4)
 
@@ -116,7 +116,7 @@ def test_more_than_255_points_and_late_frames(tmp_path: Path) -> None:
     recording = read(path)
     assert recording.marker_names == tuple(points)
     np.testing.assert_allclose(recording.markers[:, 299], 1e-3 * points["M299"], atol=1e-6)
-    assert "Time 0 is frame 70001 of the capture (700 s after its start)." in recording.notes
+    assert "Time 0 is frame 70001 of the capture (700 s after its start)." in map(str, recording.notes)
     assert recording.events == (Event(pytest.approx(0.2, abs=1e-4), "Foot Strike", "left"),)
 
 
@@ -149,7 +149,7 @@ def test_units_of_length(tmp_path: Path, unit: str | None, factor: float, said: 
     points = {name: factor * values for name, values in BODY.items()}
     recording = read(made_c3d(tmp_path / "a.c3d", points, unit=unit))
     np.testing.assert_allclose(recording.marker("C7"), 1e-3 * BODY["C7"], rtol=1e-5)
-    assert any(said in note for note in recording.notes)
+    assert any(said in note for note in map(str, recording.notes))
     assert recording.length_unit == ("mm" if factor == 1.0 else "m")
 
 
@@ -185,7 +185,7 @@ def test_analog_channels_and_their_windows(tmp_path: Path) -> None:
     part = recording.window(0.1, 0.2)
     np.testing.assert_array_equal(part.analog[0].values, analog[0][80 : 8 * 21])
     assert part.analog[1].time[0] == pytest.approx(part.time[0])
-    assert any("ANALOG:RATE says 790" in note for note in recording.notes)
+    assert any("ANALOG:RATE says 790" in note for note in map(str, recording.notes))
 
 
 def test_events(tmp_path: Path) -> None:
@@ -196,11 +196,11 @@ def test_events(tmp_path: Path) -> None:
         ("Go", "", 0.1),
         ("Foot Off", "right", 0.3),
     ]
-    assert "1 of 3 events lie outside the file's frames: left out." in recording.notes
+    assert "1 of 3 events lie outside the file's frames: left out." in map(str, recording.notes)
     assert [e.label for e in recording.window(0.2, 0.35).events] == ["Foot Off"]
     other = read(made_c3d(tmp_path / "b.c3d", BODY, {"EVENT": event | {"TIMES": 0.001 * times}}, first=1001))
     assert len(other.events) == 3
-    assert any("counted from the file's first frame" in note for note in other.notes)
+    assert any("counted from the file's first frame" in note for note in map(str, other.notes))
 
 
 # --- the person

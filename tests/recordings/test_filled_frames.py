@@ -30,7 +30,7 @@ def test_a_frame_that_repeats_the_one_before_is_missing() -> None:
     markers[100] = markers[99]
     found, notes = cleaned(time, markers)
     assert np.isnan(found[100]).all() and np.isfinite(np.delete(found, 100, axis=0)).all()
-    assert any("1 of 200, the first is frame 101 (1.000 s)" in text for text in notes)
+    assert any("1 of 200, the first is frame 101 (1.000 s)" in text for text in map(str, notes))
 
 
 def test_a_rate_that_was_doubled_is_refused() -> None:
@@ -55,7 +55,7 @@ def test_a_gap_that_was_filled_by_a_straight_line_is_one(noise_m: float) -> None
     found, notes = cleaned(time, markers)
     assert np.isnan(found[span, 1]).all()
     assert np.isfinite(np.delete(found, 1, axis=1)).all() and np.isfinite(found[:80, 1]).all()
-    assert any("filled by straight lines: b." in text for text in notes)
+    assert any("filled by straight lines: b." in text for text in map(str, notes))
 
 
 def test_smooth_markers_of_a_fast_system_are_no_lines() -> None:

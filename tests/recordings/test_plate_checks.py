@@ -25,14 +25,14 @@ def check(recording: Recording, mass_kg: float | None = None) -> PlateCheck:
 
 
 def warnings(found: PlateCheck) -> list[str]:
-    return [text for text in found.messages if text.startswith("Warning:")]
+    return [text for text in map(str, found.messages) if text.startswith("Warning:")]
 
 
 def test_a_good_recording_is_not_doubted_and_gives_the_mass() -> None:
     found = check(standing(70.0), 70.0)
     assert found.refusal is None and not warnings(found)
     assert found.mass_kg_from_plates == pytest.approx(70.0)
-    said = " ".join(found.messages)
+    said = " ".join(map(str, found.messages))
     assert "686.5 N" in said
     assert "plate 1: centre of pressure under the left foot" in said
     assert "plate 2: centre of pressure under the right foot" in said
@@ -82,7 +82,9 @@ def test_plates_that_nobody_loads_are_left_out_with_a_warning_unless_they_lie_el
     found = check(made)
     assert found.refusal is None and found.mass_kg_from_plates is None
     assert bool(warnings(found)) == warned
-    assert found.messages[-1].startswith("Warning: the plates carry nobody" if warned else "Nobody steps on the plates")
+    assert str(found.messages[-1]).startswith(
+        "Warning: the plates carry nobody" if warned else "Nobody steps on the plates"
+    )
 
 
 @pytest.mark.parametrize(("shift_m", "weighs"), [(0.0, True), (-0.25, False)])
@@ -106,14 +108,14 @@ def test_who_stands_over_a_plates_edge_is_not_weighed(shift_m: float, weighs: bo
     found = check(made.with_plates(plates))
     assert found.refusal is None
     assert found.mass_kg_from_plates == (pytest.approx(70.0) if weighs else None)
-    said = [text for text in found.messages if "over the edge of plate 1" in text]
+    said = [text for text in map(str, found.messages) if "over the edge of plate 1" in text]
     assert bool(said) != weighs
 
 
 def test_pressure_somewhat_off_the_foot_is_a_warning() -> None:
     found = check(standing(70.0, cop_shift_m=0.3))
     assert found.refusal is None
-    assert any(text.startswith("Warning: plate 1: centre of pressure 200 mm away") for text in found.messages)
+    assert any(text.startswith("Warning: plate 1: centre of pressure 200 mm away") for text in map(str, found.messages))
 
 
 def raised(recording: Recording, by_m: float) -> Recording:
@@ -154,15 +156,17 @@ def test_a_foot_without_a_low_marker_accuses_no_plate() -> None:
     feet = {"left": ["LHEE"], "right": ["RHEE"]}
     recording = replace(made, markers=markers)
     found = check_plates(recording, find_ground_frame(recording, vertical="+Y"), 70.0, feet)
-    assert found.refusal is None and not any("surface" in text for text in found.messages)
+    assert found.refusal is None and not any("surface" in text for text in map(str, found.messages))
 
 
 def test_both_plates_under_one_foot_and_big_free_moments_are_told() -> None:
     good = standing(70.0)
     doubled = replace(good, plates=(good.plates[0], replace(good.plates[0], name="plate 2")))
-    assert any("both have their centre of pressure under the left foot" in text for text in check(doubled).messages)
+    assert any(
+        "both have their centre of pressure under the left foot" in text for text in map(str, check(doubled).messages)
+    )
     twisted = replace(good.plates[0], free_moment=good.plates[0].free_moment + np.array([8.0, 30.0, 0.0]))
-    said = " ".join(check(replace(good, plates=(twisted, good.plates[1]))).messages)
+    said = " ".join(map(str, check(replace(good, plates=(twisted, good.plates[1]))).messages))
     assert "free moment 32.0 N m is large" in said
     assert "8.0 N m about horizontal axes" in said
 
@@ -172,10 +176,10 @@ def test_an_idle_plate_and_missing_foot_markers_are_told() -> None:
     idle = replace(good.plates[0], name="plate 3", force=np.zeros((101, 3)), moment=np.zeros((101, 3)))
     found = check(replace(good, plates=(*good.plates, idle)))
     assert found.refusal is None and not warnings(found)
-    assert any("plate 3 carries nothing" in text for text in found.messages)
+    assert any("plate 3 carries nothing" in text for text in map(str, found.messages))
     frame = find_ground_frame(good)
     other = check_plates(good, frame, foot_markers={"left": ["NONE"]})
-    assert any("no foot markers" in text for text in other.messages)
+    assert any("no foot markers" in text for text in map(str, other.messages))
 
 
 @pytest.mark.parametrize(("factor", "turned"), [(1.0, False), (-0.25, False), (-1.0, True)])
@@ -198,7 +202,7 @@ def test_a_plate_is_not_held_against_the_other_foot_while_its_own_is_not_seen(hi
     right = replace(right, force=right.force * pressed, moment=right.moment * pressed)
     found = check(unseen(recording, "RHEE", "RTOE", "RMT5", frames=hidden).with_plates((left, right)), 70.0)
     assert found.refusal is None
-    said = " ".join(found.messages)
+    said = " ".join(map(str, found.messages))
     assert ("plate 2 bears load only while a foot is not seen" in said) == (hidden.stop == 60)
     assert ("plate 2: centre of pressure under the right foot, 15 mm outside" in said) == (hidden.stop == 30)
 
@@ -208,7 +212,7 @@ def test_without_standing_the_mass_is_only_told() -> None:
     hop = good.markers + np.array([0, 0.1, 0]) * np.sin(2 * np.pi * 2 * good.time)[:, None, None]
     found = check(replace(good, markers=hop), 70.0)
     assert found.mass_kg_from_plates is None
-    assert any("does not stand still" in text for text in found.messages)
+    assert any("does not stand still" in text for text in map(str, found.messages))
     assert found.refusal is None
 
 

@@ -30,7 +30,7 @@ def walked(length: float = 0.6, **changes: object) -> Made:
 
 
 def messages(recording: Recording) -> list[str]:
-    return [t for t in foot_loads(recording, LABORATORY, FOOT_MARKERS).messages if t.startswith("Warning")]
+    return [t for t in map(str, foot_loads(recording, LABORATORY, FOOT_MARKERS).messages) if t.startswith("Warning")]
 
 
 def test_plates_that_are_what_they_should_be_are_not_complained_of() -> None:

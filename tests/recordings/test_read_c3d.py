@@ -121,7 +121,7 @@ def test_all_types(tmp_path: Path, kind: int, sign: float, depth_sign: float, tu
     np.testing.assert_allclose(plate.free_moment, np.tile(turn @ FREE_P, (T, 1)), atol=1e-3)
     assert plate.corners is not None
     np.testing.assert_allclose(plate.corners, CENTRE + LOCAL_CORNERS @ turn.T, atol=1e-6)
-    assert any("person's action" in note for note in recording.notes) == (sign < 0)
+    assert any("person's action" in note for note in map(str, recording.notes)) == (sign < 0)
 
 
 def two_plates(tmp_path: Path, pushes: tuple[np.ndarray, np.ndarray]) -> Path:
@@ -147,7 +147,7 @@ def test_one_plate_of_the_opposite_sign_is_turned_and_named(tmp_path: Path, turn
     recording = read(two_plates(tmp_path, (signs[0] * ALL, signs[1] * SHORT)))
     for plate in recording.plates:
         np.testing.assert_allclose(plate.force[0], R_LP @ FORCE_P, rtol=0.05)
-    assert [note for note in recording.notes if "action" in note] == [
+    assert [note for note in map(str, recording.notes) if "action" in note] == [
         f"The file stores the person's action on plate {turned + 1}, unlike its other plates; turned into the ground's "
         "reaction."
     ]
@@ -158,10 +158,10 @@ def test_an_idle_plate_that_drifts_is_not_turned(tmp_path: Path) -> None:
     drift, offset = -0.15 * np.linspace(0.0, 1.0, T * PER_FRAME), np.where(SHORT > 0.0, 1.0, -0.1)
     recording = read(two_plates(tmp_path, (ALL, drift)))
     np.testing.assert_array_equal(recording.plates[1].force, 0.0)
-    assert any(note.startswith("Warning: plate 2 pulls by up to 120 N") for note in recording.notes)
+    assert any(note.startswith("Warning: plate 2 pulls by up to 120 N") for note in map(str, recording.notes))
     recording = read(two_plates(tmp_path, (ALL, offset)))
     np.testing.assert_allclose(recording.plates[1].force[0], R_LP @ FORCE_P, rtol=0.05)
-    assert not any("action" in note for note in recording.notes)
+    assert not any("action" in note for note in map(str, recording.notes))
 
 
 @pytest.mark.parametrize(
@@ -281,7 +281,7 @@ def test_other_units_are_converted_and_unknown_ones_are_named(
     )
     recording = read(path)
     np.testing.assert_allclose(recording.total_wrench()[5], expected_wrench(R_LP), rtol=1e-4, atol=2e-2)
-    said = [note for note in recording.notes if "unknown unit" in note]
+    said = [note for note in map(str, recording.notes) if "unknown unit" in note]
     assert said == (
         [
             "Warning: plate 1: unknown unit 'furlong' of its forces in ANALOG:UNITS, N taken.",
@@ -309,7 +309,7 @@ def test_each_plate_is_kept_and_an_idle_one_is_zero(tmp_path: Path) -> None:
     np.testing.assert_array_equal(recording.plates[1].force, 0.0)
     np.testing.assert_array_equal(recording.plates[1].moment, 0.0)
     assert np.isnan(recording.plates[1].cop).all()
-    assert any("plate 2 reads 6 N where nobody stands" in note for note in recording.notes)
+    assert any("plate 2 reads 6 N where nobody stands" in note for note in map(str, recording.notes))
     kept = read(path, force_threshold_n=0.0)
     np.testing.assert_allclose(kept.plates[1].force[:, 2], 6.0, rtol=1e-5)
 
@@ -352,9 +352,9 @@ def test_markers_missing_unlabelled_and_prefixed(tmp_path: Path) -> None:
     assert np.isnan(recording.marker("S1:RASI")[5]).all()
     assert np.isnan(recording.markers).sum() == 6
     np.testing.assert_allclose(recording.marker("S1:LASI")[0], [0.1, 0.2, 0.3])
-    assert any("1 unlabelled points left out" in note for note in recording.notes)
+    assert any("1 unlabelled points left out" in note for note in map(str, recording.notes))
     assert recording.plates == ()
-    assert any("no force plates" in note for note in recording.notes)
+    assert any("no force plates" in note for note in map(str, recording.notes))
     with pytest.raises(RecordingError, match="no force plates"):
         recording.total_wrench()
 
@@ -386,7 +386,7 @@ def test_plates_that_cannot_be_understood(tmp_path: Path) -> None:
     def said(**other: object) -> str:
         recording = read(write_c3d(tmp_path / "a.c3d", body(), **(common | other)))  # type: ignore[arg-type]
         assert recording.plates == () and recording.marker_names == ("LASI",)
-        return " ".join(recording.notes)
+        return " ".join(map(str, recording.notes))
 
     assert "Warning: plate 1 left out: found type 21, expected a force plate of type 1 to 7." in said(kinds=[21])
     assert "plate 1 left out: it has type 5 and no calibration in FORCE_PLATFORM:CAL_MATRIX" in said(
@@ -420,7 +420,7 @@ def test_channels_without_a_calibration_are_taken_as_calibrated(tmp_path: Path) 
     path = write_c3d(tmp_path / "a.c3d", body(), kinds=[4], channels=channels_of(2), origins=[origin_of(2)], **common)  # type: ignore[arg-type]
     recording = read(path)
     np.testing.assert_allclose(recording.total_wrench()[3], expected_wrench(R_LP), rtol=1e-5, atol=2e-2)
-    assert "plate 1 has no calibration in the file: its channels are taken as calibrated." in recording.notes
+    assert "plate 1 has no calibration in the file: its channels are taken as calibrated." in map(str, recording.notes)
 
 
 def test_causal_reading_says_its_delay(tmp_path: Path) -> None:
@@ -434,7 +434,7 @@ def test_causal_reading_says_its_delay(tmp_path: Path) -> None:
     )
     recording = read(path, causal=True, plate_filter_hz=20.0)
     np.testing.assert_allclose(recording.total_wrench()[7], expected_wrench(R_LP), rtol=1e-5, atol=2e-2)
-    assert any("ms late" in note for note in recording.notes)
+    assert any("ms late" in note for note in map(str, recording.notes))
     with pytest.raises(RecordingError, match="expected less than 500 Hz"):
         read(path, plate_filter_hz=600.0)
 
@@ -458,6 +458,6 @@ def test_moments_in_another_unit_than_the_file_says(tmp_path: Path, word: str, s
         analog_units=["N"] * 3 + [word] * 3,
     )
     recording = read(path)
-    assert any(said in note for note in recording.notes)
+    assert any(said in note for note in map(str, recording.notes))
     away = np.abs(np.nanmedian(recording.plates[0].cop, axis=0)).max()
     assert away == pytest.approx(0.2, abs=0.01) if not word else away < 0.003

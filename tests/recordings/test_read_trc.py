@@ -55,14 +55,14 @@ def test_blank_cells_and_exact_zeros_are_missing(tmp_path: Path) -> None:
     assert np.isnan(recording.markers[0, 0]).all()
     assert np.isnan(recording.markers[1, 1]).all()
     np.testing.assert_allclose(recording.markers[1, 0], [0.001, 0.002, 0.003])
-    assert any("0, 0, 0" in note and "RANK" in note for note in recording.notes)
-    assert any("RKNE 50 %" in note for note in recording.notes)
+    assert any("0, 0, 0" in note and "RANK" in note for note in map(str, recording.notes))
+    assert any("RKNE 50 %" in note for note in map(str, recording.notes))
 
 
 def test_frame_without_any_marker_is_said(tmp_path: Path) -> None:
     recording = read(write(tmp_path, "a.trc", TRC_TOP + "1\t0\t1\t2\t3\t4\t5\t6\n2\t0.01\t\t\t\t\t\t\n"))
     assert np.isnan(recording.markers[1]).all()
-    assert any("1 frames have no marker at all, the first is frame 2" in note for note in recording.notes)
+    assert any("1 frames have no marker at all, the first is frame 2" in note for note in map(str, recording.notes))
 
 
 def test_prefix_and_blanks_in_names_stay(tmp_path: Path) -> None:
@@ -74,13 +74,13 @@ def test_missing_unit_is_found_and_said(tmp_path: Path) -> None:
     text = TRC.replace("\tUnits", "\t").replace("\tmm\t", "\t\t").replace("4.5\t5.5", "904.5\t5.5")
     recording = read(write(tmp_path, "a.trc", text))
     assert recording.length_unit == "mm"
-    assert any("no length unit" in note for note in recording.notes)
+    assert any("no length unit" in note for note in map(str, recording.notes))
 
 
 def test_header_counts_that_are_wrong_are_said(tmp_path: Path) -> None:
     recording = read(write(tmp_path, "a.trc", TRC.replace("100\t100\t2\t2", "50\t50\t7\t3")))
     assert recording.n_frames == 2
-    said = " ".join(recording.notes)
+    said = " ".join(map(str, recording.notes))
     assert "7 frames" in said
     assert "3 markers" in said
 

@@ -33,9 +33,9 @@ def test_opencap_standing_weighs_60_05_kg(data_dir: Path) -> None:
     assert frame.vertical == "+Y"
     assert frame.forward @ [1, 0, 0] > 0.995
     found = check_plates(recording, frame, 60.05, foot_markers_of(recording))
-    assert found.refusal is None and not any(text.startswith("Warning:") for text in found.messages)
+    assert found.refusal is None and not any(text.startswith("Warning:") for text in map(str, found.messages))
     assert found.mass_kg_from_plates == pytest.approx(60.05, abs=0.05)
-    said = " ".join(found.messages)
+    said = " ".join(map(str, found.messages))
     assert "plate 1: centre of pressure under the right foot" in said
     assert "plate 2: centre of pressure under the left foot" in said
 
@@ -68,10 +68,12 @@ def test_s1_standing(data_dir: Path) -> None:
     assert any("Y_SCREEN says -Z" in sentence for sentence in frame.how)
     assert np.degrees(np.arctan2(frame.forward[1], frame.forward[0])) == pytest.approx(-61, abs=3)
     found = check_plates(recording, frame, 78.6, foot_markers_of(recording))
-    assert found.refusal is None and not any(text.startswith("Warning:") for text in found.messages)
+    assert found.refusal is None and not any(text.startswith("Warning:") for text in map(str, found.messages))
     assert found.mass_kg_from_plates == pytest.approx(81.3, abs=0.1)
     for plate, foot in zip(recording.plates, ("left", "right"), strict=True):
-        assert any(f"{plate.name}: centre of pressure under the {foot} foot" in text for text in found.messages)
+        assert any(
+            f"{plate.name}: centre of pressure under the {foot} foot" in text for text in map(str, found.messages)
+        )
 
 
 def test_s1_flywheel_squat_is_a_warning_with_numbers(data_dir: Path) -> None:
@@ -82,7 +84,7 @@ def test_s1_flywheel_squat_is_a_warning_with_numbers(data_dir: Path) -> None:
     assert frame.vertical == "+Z"
     found = check_plates(recording, frame, 78.6, foot_markers_of(recording))
     assert found.refusal is None
-    assert any("129.00 kg" in text and text.startswith("Warning") for text in found.messages)
+    assert any("129.00 kg" in text and text.startswith("Warning") for text in map(str, found.messages))
     ground = frame.wrench_to_ground(recording.total_wrench())
     assert (ground[:, 1] > 500).all()
 
@@ -96,13 +98,15 @@ def test_gait_with_three_plates(data_dir: Path) -> None:
     found = check_plates(recording, frame, 66.0, foot_markers_of(recording))
     assert found.refusal is None
     for k, foot in enumerate(("right", "left", "right")):
-        assert any(f"plate {k + 1}: centre of pressure under the {foot} foot" in text for text in found.messages)
+        assert any(
+            f"plate {k + 1}: centre of pressure under the {foot} foot" in text for text in map(str, found.messages)
+        )
     # Over one stride, from the middle of one right stance to the middle of the next, the mean force is m g.
     # The file's notes say 66 kg; its plates read 58 kg, two of them with offsets of -8 and -19 N.
     middles = [int(np.mean(np.flatnonzero(recording.plates[k].force[:, 1] > 50))) for k in (0, 2)]
     mass = recording.total_wrench()[slice(*middles), 1].mean() / G
     assert mass == pytest.approx(58.1, abs=0.2)
-    assert any("plate 3 reads -19" in note for note in recording.notes)
+    assert any("plate 3 reads -19" in note for note in map(str, recording.notes))
 
 
 @pytest.mark.parametrize("name", ["GaitNormal_1", "S1_StandingRef", "S1_FlywheelSquat"])

@@ -100,7 +100,7 @@ def test_a_belts_speed_is_found_and_its_feet_stand(speed: float) -> None:
     made = steps(lasting(14, stance, every), feet, plates, belt_m_s=speed)
     loads = found(made)
     assert_true(made, loads)
-    said = [text for text in loads.messages if "belt" in text]
+    said = [text for text in map(str, loads.messages) if "belt" in text]
     assert len(said) == 2 and all(abs(float(t.split(" at ")[1].split()[0]) - speed) < 0.03 * speed for t in said)
     for k, side in enumerate(("right", "left")):
         for one in feet[side][1:-1]:
@@ -119,13 +119,13 @@ def test_belts_that_move_apart_each_carry_their_foot() -> None:
     made = steps(lasting(10), feet, plates, belt_m_s={"right": 0.6, "left": 1.2})
     loads = found(made)
     assert_true(made, loads)
-    speeds = {t.split()[1]: float(t.split(" at ")[1].split()[0]) for t in loads.messages if "belt" in t}
+    speeds = {t.split()[1]: float(t.split(" at ")[1].split()[0]) for t in map(str, loads.messages) if "belt" in t}
     assert speeds["right"] == pytest.approx(0.6, abs=0.03) and speeds["left"] == pytest.approx(1.2, abs=0.05)
 
 
 def test_no_belt_is_seen_where_people_walk_over_the_floor() -> None:
     made = steps(lasting(6), walk(6, 0.65), plates_of(walk(6, 0.65)))
-    assert not any("belt" in text for text in found(made).messages)
+    assert not any("belt" in text for text in map(str, found(made).messages))
 
 
 def test_a_box_that_no_plate_measures_bears_a_foot_that_alone_can_and_a_foot_held_up_stands_on_nothing() -> None:

@@ -26,7 +26,7 @@ def gait(request: pytest.FixtureRequest) -> Recording:
 def test_stamps_of_software_are_put_back(gait: Recording, jitter_s: float) -> None:
     stamps = gait.time + np.random.default_rng(1).uniform(-jitter_s, jitter_s, gait.n_frames)
     time, notes = settled_times(stamps, gait.markers)
-    assert len(notes) == 1 and "about an even 100 Hz" in notes[0]
+    assert len(notes) == 1 and "about an even 100 Hz" in notes[0].text
     np.testing.assert_allclose(time, gait.time, atol=jitter_s / 5)
 
 

@@ -52,7 +52,9 @@ def test_what_stands_for_a_missing_value(tmp_path: Path, text: str) -> None:
 def test_placeholders_are_missing_with_a_note(tmp_path: Path, text: str) -> None:
     found = read(trc(tmp_path / "a.trc", cells={(k, 2): text for k in range(10, 15)}))
     assert np.isnan(found.markers[10:15, 2]).all() and np.isfinite(found.markers).sum() == 40 * 18 - 15
-    assert [note for note in found.notes if "far outside the volume, taken as missing (5 samples: M2)" in note]
+    assert [
+        note for note in map(str, found.notes) if "far outside the volume, taken as missing (5 samples: M2)" in note
+    ]
 
 
 def test_a_marker_that_stands_far_away_is_no_placeholder(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynakin.messages import note
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import repetitions_of
@@ -64,6 +65,6 @@ def made_comparison(estimate: Estimate) -> Trial:
             Method("AT (6 Hz)", "AT", *shifted, data),
             Method("classical (6 Hz)", "classical", *shifted, data),
         ),
-        notes=("AT: a sentence on AT.",),
+        notes=(note("method", "AT: a sentence on AT."),),
         estimates={"paper": estimate},
     )

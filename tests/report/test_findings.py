@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from dynakin.messages import TOPICS, Topic, note, warning
 from dynakin.report.findings import forces
 from dynakin.report.findings.finding import Insight
+from dynakin.report.findings.said import warned
 from dynakin.report.insights import insights
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
@@ -71,24 +74,24 @@ def test_a_bound_that_lies_nearer_than_a_number_is_known_says_nothing(estimate: 
     assert finding.level == "warning" and "1 of 47 estimated parameters end on a bound: thigh length." in finding.text
 
 
-def test_what_was_warned_of_is_a_finding_by_its_subject(estimate: Estimate) -> None:
-    warned = replace(
-        estimate,
-        messages=[
-            "Warning: plate 1 lies off its place: 0.1 m.",
-            "Warning: gaps were filled by straight lines: r_toe.",
-            "Warning: mass 70.0 kg assumed, of a mean adult of 1.70 m.",
-            "Warning: mass 70.0 kg from the plates.",
-            "Warning: no marker shows left knee.",
-            "A note.",
-        ],
-    )
-    made = {i.title: i for i in insights(warned, compute_metrics(warned)) if i.level == "warning"}
-    assert {"Force plates", "Recording", "Subject"} <= set(made)
-    assert "lies off its place" in made["Force plates"].text and "r_toe" in made["Recording"].text
-    assert "assumed" in made["Subject"].text and "from the plates" not in made["Subject"].text
-    assert all("left knee" not in insight.text for insight in made.values())
-    assert not {"Recording", "Subject"} & set(found(replace(estimate, messages=[])))
+@pytest.mark.parametrize("topic", TOPICS)
+def test_every_warning_is_part_of_one_finding_whatever_its_topic(estimate: Estimate, topic: Topic) -> None:
+    said = [warning(topic, "plate 1 has 0.1 m of mass."), note(topic, "a note.")]
+    made = [i for i in warned(replace(estimate, messages=[*said, said[0]]), {}) if i.level == "warning"]
+    assert [insight.text for insight in made] == ["Plate 1 has 0.1 m of mass."] and made[0].advice
+    assert made[0] in insights(replace(estimate, messages=said), compute_metrics(estimate))
+    assert warned(replace(estimate, messages=said[1:]), {}) == []
+
+
+def test_warnings_of_one_kind_are_one_finding(estimate: Estimate) -> None:
+    said = [
+        warning("plates", "one."),
+        warning("mass", "two."),
+        warning("in step", "three."),
+        warning("labels", "four."),
+    ]
+    made = {insight.title: insight.text for insight in warned(replace(estimate, messages=said), {})}
+    assert made == {"Subject": "Two.", "Force plates": "One. Three.", "Recording": "Four."}
 
 
 def test_a_segment_that_nobody_sees_for_long_is_a_finding(estimate: Estimate) -> None:

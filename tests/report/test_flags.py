@@ -141,7 +141,7 @@ def test_absent_legs_are_not_drawn_and_the_page_says_so_first() -> None:
     assert section.text.startswith("Leg moments: absent in all 301 frames.")
     assert [panel.title for part in section.parts for panel in [*part.panels, *part.folded]] == ["Arm flex"]
     assert "Absent in every frame: right knee and left knee." in section.text
-    assert section.notes == (gone.messages[-1],)
+    assert section.notes == (gone.messages[-1].text,)
     data["moment_source"][:], data["moments"][:] = ABSENT, np.nan
     nothing = replace(walker, data=data)
     found = compute_metrics(nothing)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynakin.messages import note
 from dynakin.report.comparison_page import render_comparison
 from dynakin.report.page import render_report
 from dynakin.report.text_tables import table2_text, unseen_text
@@ -70,7 +71,9 @@ def test_pages_are_whole_and_need_no_other_file(which: str, request: pytest.Fixt
 
 def test_without_reference_methods_the_page_says_why_in_a_line(jointed: Estimate, comparison: Trial) -> None:
     alone = replace(
-        comparison, methods=comparison.methods[:1], notes=("AT and the classical method are left out: why.",)
+        comparison,
+        methods=comparison.methods[:1],
+        notes=(note("method", "AT and the classical method are left out: why."),),
     )
     html = render_report(jointed, comparison=alone)
     assert part(html, "methods") == "Other methods AT and the classical method are left out: why."
@@ -116,7 +119,7 @@ def test_many_trials_give_their_spread_and_their_own_repetitions(comparison: Tri
 
 def test_parameters_judged_alone_make_a_page_too(comparison: Trial) -> None:
     rows = [row for row in table2([comparison]) if row.quantity == "fy"]
-    html = render_comparison([], {"held_out": rows}, SETTINGS * 2, ["A", "B"], ["B: a note"])
+    html = render_comparison([], {"held_out": rows}, SETTINGS * 2, ["A", "B"], [note("method", "B: a note")])
     assert "<h1>A → B</h1>" in html and "20.0 N" in part(html, "held-out") and "B: a note" in part(html, "details")
 
 

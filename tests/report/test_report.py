@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynakin.messages import note
 from dynakin.report.figure import new_axes, to_svg
 from dynakin.report.findings import fit, forces, recording, run, uncertainty
 from dynakin.report.findings.finding import Insight
@@ -88,7 +89,7 @@ def test_a_clean_run_is_said_to_be_clean() -> None:
 
 def test_names_from_files_cannot_break_the_page(estimate: Estimate) -> None:
     recording = replace(estimate.recording, name="<script>alert(1)</script>")
-    html = render_report(replace(estimate, recording=recording, messages=["<b>bold</b> & more"]))
+    html = render_report(replace(estimate, recording=recording, messages=[note("recording", "<b>bold</b> & more")]))
     assert "<script>" not in html and "&lt;script&gt;" in html
     assert "&lt;b&gt;bold&lt;/b&gt; &amp; more" in html
 

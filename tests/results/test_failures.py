@@ -40,7 +40,7 @@ def test_a_page_that_fails_loses_no_file(short: Estimate, tmp_path: Path, monkey
     assert {file.name for file in out.iterdir()} >= {*OUTPUT_FILES, "failures.log"} - {"report.html"}
     assert not (out / "report.html").exists()
     expected = "Failed: report.html: MemoryError: Unable to allocate 6.8 TiB."
-    assert failures.messages() == [expected]
+    assert list(map(str, failures.messages())) == [expected]
     written = json.loads((out / "metrics.json").read_text())
     assert written["messages"][-1] == expected and written["failures"] == ["report.html"]
     assert "Traceback" in (out / "failures.log").read_text()
@@ -117,7 +117,7 @@ def test_page_and_console_bear_any_block_that_failed(
     failures = Failures()
     with failures.stage("figures"):
         raise OSError(28, "No space left on device")
-    assert failures.messages() == ["Failed: figures: OSError: [Errno 28] No space left on device."]
+    assert list(map(str, failures.messages())) == ["Failed: figures: OSError: [Errno 28] No space left on device."]
 
 
 def test_a_folder_for_figures_may_hold_anything_but_has_to_take_files(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import xarray as xr
 from rich.console import Console
 
 from dynakin.cli import summary
+from dynakin.messages import note, warning
 from dynakin.pipeline.result import Result
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.formats.mot import read_table
@@ -157,7 +158,7 @@ def test_frames_are_counted_by_leg_and_said_with_the_reason() -> None:
     assert found["verdict"] == (
         "Leg moments: right measured in 301 of 301 frames; left measured in 241 and derived from the motion in 60."
     )
-    assert found["reasons"] == make_walker((2,)).messages[-1:]
+    assert found["reasons"] == [make_walker((2,)).messages[-1].text]
     prior = compute_metrics(make_walker((2,), code=PRIOR))["moments"]
     assert prior["legs"]["left"] == {"measured": 241, "derived": 0, "prior": 60, "absent": 0}
     assert prior["verdict"].endswith("left measured in 241 and estimated with a prior in 60.")
@@ -201,10 +202,10 @@ def test_reasons_are_the_grounds_and_of_lost_frames_whatever_other_messages_say(
     """0.1 sought words: a column not used was a reason, plates that are NaN were none."""
     walker = make_walker((2,))
     other = "columns not used: emg_1."
-    said = replace(walker, messages=[*walker.messages, other])
+    said = replace(walker, messages=[*walker.messages, note("recording", other)])
     assert other not in compute_metrics(said)["moments"]["reasons"]
     assert compute_metrics(replace(said, config={}))["moments"]["reasons"] == []
-    plates = replace(said, config={"ground": {"reasons": ["Warning: the plates are silent from 1.70 to 2.30 s."]}})
+    plates = replace(said, config={"ground": {"reasons": ["the plates are silent from 1.70 to 2.30 s."]}})
     assert compute_metrics(plates)["moments"]["reasons"] == ["The plates are silent from 1.70 to 2.30 s."]
     held = plates.data.assign(tracking=("time", np.where(np.arange(301) < 10, 2, 0)))
     reasons = compute_metrics(without_lost(replace(plates, data=held)))["moments"]["reasons"]
@@ -337,24 +338,25 @@ def test_the_console_says_first_what_is_measured(monkeypatch: pytest.MonkeyPatch
     assert "off the plates from 1.70 to 2.30 s" in second
 
 
-@pytest.mark.parametrize("doubt", ["check the mass", "the mass is wrong"])
-def test_the_console_says_warnings_before_figures_and_the_mass_first(
-    doubt: str, monkeypatch: pytest.MonkeyPatch
+def test_the_console_says_every_warning_once_under_the_verdict_and_the_mass_first(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     walker, text = make_walker(), io.StringIO()
-    light = f"Warning: the plates carry 70.0 kg on average where the person weighs 40.0 kg: {doubt}."
-    doubted = replace(walker, messages=["Warning: something else.", light, "A note."])
-    monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=200))
+    light = warning("weight", "the plates carry 70.0 kg on average where the person weighs 40.0 kg.")
+    doubted = replace(walker, messages=[warning("recording", "something else."), light, note("recording", "A note.")])
+    monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=1000))
     summary.print_summary(Result(doubted), Path("out"))
-    lines = text.getvalue().splitlines()
-    assert lines[1:3] == [light, "Warning: something else."]
+    (verdict,) = (k for k, line in enumerate(text.getvalue().splitlines()) if line.startswith("Verdict:"))
+    lines = text.getvalue().splitlines()[verdict + 1 :]
+    assert lines[0] == f"  Mass: T{light.text[1:]}" and lines[1].startswith("  Mass, what to do: ")
+    assert lines[2] == "  Recording: Something else." and lines[3].startswith("  Recording, what to do: ")
+    assert text.getvalue().casefold().count("the plates carry") == 1
     data = walker.data.assign(moments=walker.data["moments"].where(walker.data["coordinate"] != "knee_angle_r"))
     text.seek(0)
-    known = {"ground": {"reasons": [light]}}  # said first, as a reason, and not again
+    known = {"ground": {"reasons": [light.text]}}  # said first, as a reason, and not again
     summary.print_summary(Result(replace(doubted, data=data, config=doubted.config | known)), Path("out"))
     assert text.getvalue()[: text.tell()].casefold().count("the plates carry") == 1
-    assert lines[0].startswith("Leg moments:") and "Verdict:" not in "".join(lines[:5])
     (first, *others) = insights(doubted, compute_metrics(doubted))
-    assert (first.level, first.title) == ("warning", "Mass") and doubt in first.text
-    assert not any(doubt in insight.text for insight in others)
+    assert (first.level, first.title) == ("warning", "Mass") and "70.0 kg" in first.text
+    assert not any("70.0 kg" in insight.text for insight in others)
     assert in_short([first, *others]).split(": ")[1].startswith("mass")

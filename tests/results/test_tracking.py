@@ -51,7 +51,7 @@ def test_lost_frames_are_empty_and_out_of_the_figures() -> None:
         assert np.isnan(values[500:520]).all(), name
     assert np.isfinite(estimate.data["markers_measured"].values[505, :, :2]).all()
     assert why_lost(estimate) is None  # 1.7 % of the frames
-    (said,) = [message for message in estimate.messages if "lost" in message]
+    (said,) = [message for message in map(str, estimate.messages) if "lost" in message]
     assert said.startswith("Warning: the person was lost: 20 of 1201 frames") and "(5.00 to 5.19 s)" in said
     first, second, third = estimate.marker_names[ARM]
     assert said.endswith(f"or are refused, in most of these frames {first}, {second} and {third}.")

@@ -103,7 +103,7 @@ def test_a_motion_from_a_file_is_followed_and_exact(tmp_path: Path) -> None:
     assert np.degrees(np.abs(off)).max() < 0.1
     error = np.abs(np.gradient(data["speeds"].values, 2e-3, axis=0) - data["accelerations"].values)[1:-1].max()
     assert error < 5e-4 * np.abs(data["accelerations"].values).max()
-    assert "low-passed at 6 Hz" in trial.recording.notes[0]
+    assert "low-passed at 6 Hz" in trial.recording.notes[0].text
 
 
 def test_noise_in_a_file_is_smoothed_away(tmp_path: Path) -> None:

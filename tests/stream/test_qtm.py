@@ -121,7 +121,7 @@ def test_plates_that_count_from_another_moment_have_a_clock_of_their_own(squat: 
     assert streams.markers is not None and streams.plates is not None
     assert streams.plates.clock != streams.markers.clock
     assert streams.markers.rate_hz == pytest.approx(100.0) and streams.plates.names == ("AMTI 1", "AMTI 2")
-    assert any("another moment" in note for note in streams.notes)
+    assert any("another moment" in note for note in map(str, streams.notes))
 
 
 def test_nobody_answers() -> None:

@@ -62,7 +62,7 @@ def test_a_reference_that_cannot_be_had_is_a_note_where_the_run_asks_for_whateve
     alone = trial_of(compared.estimates, initial, setup.definition, 80.0, tolerant=True)
     assert [method.name for method in alone.methods] == ["EKF (default)"]
     (note,) = alone.notes
-    assert note.startswith("AT and the classical method are left out: ") and "\n" not in note
+    assert note.text.startswith("AT and the classical method are left out: ") and "\n" not in note.text
 
 
 def test_a_landmark_that_the_recording_does_not_give_is_named(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -40,7 +39,6 @@ def batch(
     with stage("loading"):
         from dynakin.report.text_tables import table2_text
         from dynakin.results.naming import plural
-        from dynakin.results.records import WARNING, warnings_of
         from dynakin.studies.batch.dataset import check_presets, read_dataset
         from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
         from dynakin.studies.batch.subjects import identify_subjects, with_parameters
@@ -73,14 +71,14 @@ def batch(
         write_batch(folder, result, identified)
     console.print(f"Tables  {folder}/table2.csv, table2_subjects.csv, trials.csv, batch.json", soft_wrap=True)
     for subject, row in identified.items():
-        for text in to_say(row["said"]):
+        for text in (*row["doubts"], row["said"][-1]):
             console.print(f"Subject {subject}: {text}", soft_wrap=True)
     for name, row in result.rows.items():
         for preset_name, verdict in row["verdict"].items():
             which = f", EKF ({preset_name})" if len(row["verdict"]) > 1 else ""
             console.print(f"Verdict {name}{which}: {verdict}", soft_wrap=True)
-        for note in warnings_of(row["notes"]):
-            console.print(f"Warned  {name}: {note.removeprefix(WARNING)}", soft_wrap=True)
+        for warning in row["warnings"]:
+            console.print(f"Warned  {name}: {warning}", soft_wrap=True)
     for name, failure in result.failures.items():
         console.print(f"Failed  {name}: {failure.message}", soft_wrap=True)
     lost = [(name, *entry) for name, row in result.rows.items() for entry in row["lost"].items()]
@@ -90,8 +88,3 @@ def batch(
         raise DynakinError(f"{dataset}: none of {len(found.sessions)} trials could be worked on")
     if result.failures or lost:
         raise typer.Exit(1)
-
-
-def to_say(said: Sequence[str]) -> list[str]:
-    """Of what the identification of a subject says, trials that are left out, warnings, and the verdict."""
-    return [*(text for text in said[:-1] if text.startswith(("Left out: ", "Warning: "))), said[-1]]

@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynakin.cli.prepared import GROUND, MARKERS, SUBJECT, Rows, assumed, contacts, short, starting
+from dynakin.cli.prepared import Rows, assumed, contacts, in_a_row, short
 from dynakin.errors import DynakinError, ModelError
 from dynakin.filter.prepared import Prepared
+from dynakin.messages import Message, about, warnings_of
 from dynakin.model.markers.recognise import fits
 from dynakin.pipeline.stages import prepare_case
 from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import sentence, words
-from dynakin.results.records import WARNING, warnings_of
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import Case
 
@@ -23,10 +23,6 @@ _LISTED, _SETS = 6, 3
 
 _SOME_KG = 70.0
 """To see what else there is where a mass is all that is missing; nothing that depends on it is said then."""
-
-
-_DETAILS = ("Lengths", "Masses", "Length of", "Start", "Marker places")
-"""Sentences of a calibration that a run's report has, and a rehearsal leaves out."""
 
 
 def rehearsed(case: Case) -> tuple[Prepared | None, DynakinError | None]:
@@ -50,7 +46,7 @@ def recording_rows(recording: Recording) -> Rows:
     """What is in the file: frames, markers, gaps, what it says of the subject, plates."""
     seconds = recording.time[-1] - recording.time[0]
     plates = f"{len(recording.plates)} force plates" if len(recording.plates) != 1 else "1 force plate"
-    rows = [
+    rows: Rows = [
         (
             "Recording",
             f"{recording.n_frames} frames at {recording.rate:.6g} Hz, {seconds:.4g} s from {recording.time[0]:g} s; "
@@ -71,7 +67,7 @@ def recording_rows(recording: Recording) -> Rows:
         loaded = 100.0 * float(np.mean(np.isfinite(plate.cop).all(axis=1)))
         text = f"{plate.name}: up to {np.nanmax(size):.0f} N, mean {np.nanmean(size):.1f} N, loaded {loaded:.0f} %."
         rows.append(("Plates", text))
-    return [*rows, *(("Note", short(text)) for text in recording.notes)]
+    return [*rows, *(("Note", short(message)) for message in recording.notes)]
 
 
 def _gaps(recording: Recording) -> str:
@@ -92,29 +88,30 @@ def _gaps(recording: Recording) -> str:
 def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None) -> Rows:
     """What `run` says first, with what it rests on, and what will come out."""
     calibrated = ready.calibrated
-    sentences = calibrated.messages
-    used = {*starting(sentences, (*MARKERS, *GROUND, *SUBJECT, *_DETAILS))}
-    more = {
-        "Model": _held(ready),
+    said = calibrated.messages
+    subject = about(said, "mass", "height", "sex")
+    elsewhere = {*about(said, "marker set", "ground", "details"), *subject}  # a run's report has the details
+    more: dict[str, list[str | Message]] = {
+        "Model": [*_held(ready)],
         "Markers": [
             f"{len(calibrated.spec.markers)} of {len(ready.recording.marker_names)} are used.",
-            *(short(text) for text in sentences if text not in used),
+            *(short(message) for message in said if message not in elsewhere),
         ],
-        "Ground": starting(sentences, GROUND),
+        "Ground": [*about(said, "ground")],
+        "Subject": [*warnings_of(subject if refusal is None else about(subject, "height"))],
     }
     rows: Rows = []
     for topic, text in assumed(ready, settings):
         if topic == "Subject" and refusal is not None:
-            text = " ".join(["The mass is missing.", *starting(sentences, SUBJECT[2:])])
-        rows += [(topic, said) for said in (text, *more.get(topic, []))]
+            text = f"The mass is missing. {in_a_row(about(subject, 'height', 'sex'))}"
+        rows += [(topic, row) for row in (text, *more.get(topic, []))]
     rows += contacts(ready)
     if refusal is not None:
         return rows
     figures = ready.moment_figures()
     rows += [("Results", text) for text in (figures["verdict"], *figures["reasons"])]
-    known = {*figures["reasons"], *used, *(sentence(text.removeprefix(WARNING)) for text in sentences)}
-    warnings = warnings_of(ready.messages)
-    return rows + [("Doubts", text) for text in warnings if sentence(text.removeprefix(WARNING)) not in known]
+    doubts = [message for message in warnings_of(ready.messages) if message not in said]
+    return rows + [("Doubts", message) for message in doubts if sentence(message.text) not in figures["reasons"]]
 
 
 def _held(ready: Prepared) -> list[str]:
@@ -152,16 +149,21 @@ def to_add(case: Case, ready: Prepared | None, refusal: DynakinError | None) -> 
         found.append("--mass KG: neither plates nor file show it.")
     if ready is None:
         return found
-    messages = ready.calibrated.messages
-    if refusal is None and starting(messages, ("Warning: mass",)):
+    said = ready.calibrated.messages
+    if refusal is None and warnings_of(about(said, "mass")):
         found.append("--mass KG: it is only estimated (Subject, above).")
-    if any("estimated from" in text for text in starting(messages, ("Height",))):
-        found.append("--height M: estimated from the markers.")
-    if starting(messages, ("Sex not given",)):
+    if settings.height_m is None and ready.calibrated.height_m is not None and "height_m" not in _in_files(case):
+        found.append("--height M: it is only estimated (Subject, above).")
+    if about(said, "sex"):
         found.append("--sex female or male: else the table's mean of both.")
     if refusal is None and ready.ground.undeclared.any() and not settings.contacts:
         found.append("--contact seat (hand_right, ...): if that is what bears the person where no plate does.")
     return found
+
+
+def _in_files(case: Case) -> set[str]:
+    """What the recordings say of the person, by its keys."""
+    return {key for recording in (case.recording, case.static) if recording is not None for key in recording.subject}
 
 
 def _measure(key: str, value: float) -> str:

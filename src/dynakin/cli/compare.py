@@ -50,6 +50,7 @@ def compare(
             print_unseen,
             settings_of,
         )
+        from dynakin.messages import Message
         from dynakin.report.comparison_page import render_comparison
         from dynakin.validation.files import check_comparison_folder, save_comparison
         from dynakin.validation.methods import Trial
@@ -63,7 +64,7 @@ def compare(
     tables: dict[str, Sequence[Any]] = {}
     more: dict[str, Any] = {"settings": settings_of(cases)}
     compared: list[Trial] = []
-    notes: list[str] = []  # of what was held out; each trial keeps its own
+    notes: list[Message] = []  # of what was held out; each trial keeps its own
     failed: DynakinError | None = None  # what is computed by then is kept
     if identify_trial is not None:
         tables |= print_held_out(console, [(cases[0], cases[1], False)], notes)
@@ -80,7 +81,7 @@ def compare(
         tables |= print_repetitions(console, compared)
         more["trials"] = [described(trial) for trial in compared]
     if notes:
-        more["notes"] = notes
+        more["notes"] = list(map(str, notes))
     if output is not None:
         with stage("writing tables and report"):
             names = [case.recording.name for case in cases]

@@ -11,10 +11,10 @@ from rich.padding import Padding
 
 from dynakin.cli.console import as_table
 from dynakin.identification.held_out import with_subject
+from dynakin.messages import Message, note, warnings_of
 from dynakin.progress import stage
 from dynakin.report.text_tables import angle_text, moment_text, table2_text, truth_text, unseen_texts
 from dynakin.results.measures.mean_curves import curve_points
-from dynakin.results.records import WARNING, warnings_of
 from dynakin.validation.case import Case
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.held_out import identify_on, judge, predict_blind
@@ -52,13 +52,13 @@ def print_comparison(
     if truth:
         console.print(as_table(truth_text(truth)))
     for trial in compared:
-        for note in trial.notes:
-            _print_note(console, note if len(compared) == 1 else f"{trial.name}: {note}")
+        for said in trial.notes:
+            _print_note(console, said if len(compared) == 1 else said.of(trial.name))
     return {"table2": rows, "angles": angles, "moments": moments, "truth": truth}
 
 
 def print_held_out(
-    console: Console, pairs: Sequence[tuple[Case, Case, bool]], notes: list[str]
+    console: Console, pairs: Sequence[tuple[Case, Case, bool]], notes: list[Message]
 ) -> dict[str, Sequence[Any]]:
     """Identified on one, judged on the other; (identifying, judging, of one recording) each. Adds to ``notes``."""
     tables = []
@@ -68,21 +68,21 @@ def print_held_out(
             identified, decided = with_subject(identified)
             blind = predict_blind(identified, judging.recording)
             tables.append(judge(blind, judging.recording))
-            fits = [text for each in identified.estimates.values() for text in warnings_of(each.messages)]
-            notes += [f"{fitted.recording.name}: {said}" for said in dict.fromkeys([*fits, *decided])]
-            judged = [*warnings_of(blind.start.messages), *blind.notes]
-            notes += [f"{judging.recording.name}: {note}" for note in judged]
+            fits = [said for each in identified.estimates.values() for said in warnings_of(each.messages)]
+            chosen = [note("method", text) for text in decided]
+            notes += [said.of(fitted.recording.name) for said in dict.fromkeys([*fits, *chosen])]
+            notes += [said.of(judging.recording.name) for said in (*warnings_of(blind.start.messages), *blind.notes)]
     names = f"{pairs[0][0].recording.name} -> {pairs[0][1].recording.name}"
     title = f"Identified -> judged from markers alone: {names if len(pairs) == 1 else f'{len(pairs)} trials'}"
     rows = merged(tables)
     console.print(as_table(table2_text(rows, title)))
-    for note in notes:
-        _print_note(console, note)
+    for said in notes:
+        _print_note(console, said)
     return {"held_out": rows}
 
 
-def _print_note(console: Console, note: str) -> None:
-    console.print(Padding(note, (0, 0, 0, 2)), style="yellow" if WARNING in note else "dim")
+def _print_note(console: Console, said: Message) -> None:
+    console.print(Padding(str(said), (0, 0, 0, 2)), style="yellow" if said.level == "warning" else "dim")
 
 
 def print_unseen(console: Console, cases: Sequence[Case], horizon_ms: float) -> dict[str, Sequence[Any]]:
@@ -133,6 +133,6 @@ def described(trial: Trial) -> dict[str, Any]:
         "mass_kg": trial.mass_kg,
         "methods": [method.name for method in trial.methods],
         "repetitions": [asdict(repetition) for repetition in trial.repetitions.items],
-        "warnings": warnings_of(trial.notes),
-        "notes": list(trial.notes),
+        "warnings": list(map(str, warnings_of(trial.notes))),
+        "notes": list(map(str, trial.notes)),
     }

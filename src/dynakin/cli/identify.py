@@ -62,8 +62,8 @@ def _print(found: Identification) -> None:
     from dynakin.identification.report import base_in_words, segment_rows
 
     console = out()
-    for text in (*found.lost, *found.warned):
-        console.print(f"- {text}", style="yellow")
+    for warning in (*found.lost, *found.warned):
+        console.print(f"- {warning}", style="yellow")
     for text in found.decision.in_words():
         console.print(f"- {text}")
     used = "used" if found.subject.use == "bodies" else "not used: the table is kept"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from rich.console import Console
@@ -12,34 +13,15 @@ from rich.text import Text
 from dynakin.arrays import runs
 from dynakin.errors import DynakinError
 from dynakin.filter.prepared import Prepared
+from dynakin.messages import Message, about, notes_of
 from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.feet.loads import MEASURED, REASONS, SHARED, SWING, FootLoads
 from dynakin.results.naming import listed, plural
-from dynakin.results.records import WARNING
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import Case
 
-Rows = list[tuple[str, str]]
+Rows = list[tuple[str, str | Message]]
 """Topics and their sentences; rows of one topic stand together."""
-MARKERS, SIDES, GROUND, SUBJECT = ("Marker set",), ("Limb markers",), ("Vertical", "Forward", "Coordinates"), (
-    "Mass ",
-    "Warning: mass",
-    "Height",
-    "height_m",
-    "Sex",
-)  # fmt: skip
-"""How the sentences of a calibration on these begin."""
-_ROUTINE = (
-    "Time 0 is ",
-    "Plates resampled from ",
-    "Missing for part of the recording",
-    " points left out",
-    " no marker and left out",
-    " no markers and left out",
-    " marker frames (",
-    "The file has no force plates",
-)
-"""Words of what is done to every file of a kind, or that the figures of a run have: not said before it."""
 _LONGEST_LIST, _KEPT = 8, 5
 _MOST_SPANS = 6
 _TOPIC = 11  # characters of the longest topic
@@ -47,25 +29,27 @@ _LEAST_S = 0.03
 """Spans of a foot that are shorter belong to what lies about them."""
 
 
-def print_rows(console: Console, rows: Iterable[tuple[str, str]]) -> None:
+def print_rows(console: Console, rows: Iterable[tuple[str, str | Message]]) -> None:
     """In two columns, warnings in yellow; a topic stands where it begins."""
     grid = Table.grid(padding=(0, 2))
     grid.add_column(style="bold", no_wrap=True, min_width=_TOPIC)
     grid.add_column(overflow="fold")
     before = ""
-    for topic, text in rows:
-        grid.add_row("" if topic == before else topic, Text(text, style="yellow" if text.startswith(WARNING) else ""))
+    for topic, said in rows:
+        warns = isinstance(said, Message) and said.level == "warning"
+        grid.add_row("" if topic == before else topic, Text(str(said), style="yellow" if warns else ""))
         before = topic or before
     console.print(grid)
 
 
 def assumed(ready: Prepared, settings: Settings) -> Rows:
-    """Model, marker set, subject, ground and plates of a run, a line or two each."""
+    """Model, marker set, subject, ground and plates of a run, a line or two each; no warnings."""
     calibrated, messages = ready.calibrated, ready.calibrated.messages
     default = "" if settings.model != Settings().model else " (the default; --model for another)"
-    rows = [("Model", f"{settings.model}{default}.")]
-    rows += [("Markers", text) for text in starting(messages, MARKERS)[:1] or [f"{len(calibrated.spec.markers)} used."]]
-    rows += [("Subject", " ".join(starting(messages, SUBJECT)))]
+    rows: Rows = [("Model", f"{settings.model}{default}.")]
+    chosen = [message.text for message in about(messages, "marker set")]
+    rows += [("Markers", text) for text in chosen[:1] or [f"{len(calibrated.spec.markers)} used."]]
+    rows += [("Subject", in_a_row(about(messages, "mass", "height", "sex")))]
     ahead = ", ".join(f"{value:.2f}" for value in calibrated.ground.forward + 0.0)
     rows += [("Ground", f"{calibrated.ground.vertical} is up; the person faces ({ahead}); {_sides(ready)}.")]
     return [*rows, ("Plates", _plates(ready))]
@@ -73,8 +57,8 @@ def assumed(ready: Prepared, settings: Settings) -> Rows:
 
 def changed(ready: Prepared) -> Rows:
     """What was turned, left out or cut in the recording, a line each; warnings stand at the end of a run."""
-    notes = [text for text in ready.recording.notes if not text.startswith(WARNING)]
-    return [("Note", short(text)) for text in notes if not any(words in text for words in _ROUTINE)]
+    notes = notes_of(ready.recording.notes)
+    return [("Note", short(message)) for message in notes if message.topic != "routine"]
 
 
 def naming_static(refusal: DynakinError, case: Case) -> DynakinError:
@@ -107,17 +91,17 @@ def contacts(ready: Prepared) -> Rows:
     return rows
 
 
-def starting(messages: Sequence[str], openings: tuple[str, ...]) -> list[str]:
-    """The sentences that begin with one of these."""
-    return [text for text in messages if text.startswith(openings)]
+def in_a_row(messages: Iterable[Message]) -> str:
+    """The notes among them."""
+    return " ".join(message.text for message in notes_of(messages))
 
 
-def short(text: str) -> str:
+def short(message: Message) -> Message:
     """A sentence whose long list is cut."""
-    parts = text.rstrip(".").split(", ")
+    parts = message.text.rstrip(".").split(", ")
     if len(parts) <= _LONGEST_LIST:
-        return text
-    return f"{', '.join(parts[:_KEPT])} and {len(parts) - _KEPT} more."
+        return message
+    return replace(message, text=f"{', '.join(parts[:_KEPT])} and {len(parts) - _KEPT} more.")
 
 
 def _sides(ready: Prepared) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from dynakin.cli.console import out, print_error, table
+from dynakin.messages import about, notes_of
 from dynakin.pipeline.result import Result
 from dynakin.report.findings.finding import Insight
 from dynakin.report.insights import in_short, insights
@@ -17,50 +19,47 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.bounds import counts_in_words
 from dynakin.results.measures.sources import MEANINGS, UNKNOWN
 from dynakin.results.measures.tracking import why_lost
-from dynakin.results.naming import listed, sentence
-from dynakin.results.records import IN_STEP, NOT_SMOOTHED, WARNING, doubts_mass, warnings_of
+from dynakin.results.naming import listed
 from dynakin.settings.lag import in_words
 
 
 def print_summary(result: Result, folder: Path) -> None:
-    """Which moments there are, what to look at, the figures, the verdict, and where the files lie."""
+    """Which moments there are, the figures, the verdict with all that is warned of, and where the files lie."""
     console, estimate, metrics = out(), result.estimate, result.metrics()
     moments = metrics["moments"] or UNKNOWN
     _print_moments(console, moments)
     for name, found in (metrics["contacts"] or {}).items():
         console.print(f"  {_contact_in_words(name, found)}", style="dim")
-    warnings = [
-        message
-        for message in warnings_of(estimate.messages)
-        if sentence(message.removeprefix(WARNING)) not in moments["reasons"]
-    ]
-    for message in sorted(warnings, key=lambda message: not doubts_mass(message)):
-        console.print(message, style="yellow")
     console.print(_figures(estimate, metrics))
-    for message in estimate.messages:
-        if message.startswith(NOT_SMOOTHED) or message.endswith(IN_STEP):
-            console.print(message)
-    _print_verdict(console, insights(estimate, metrics))
+    for message in notes_of(about(estimate.messages, "smoothing", "in step")):
+        console.print(str(message))
+    _print_verdict(console, insights(estimate, metrics), moments["reasons"])
     console.print(f"Results  {folder}", soft_wrap=True)
     if (folder / "report.html").exists():
         console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
 
 
-SAID_BEFORE = ("Joint moments", "Mass", "Joint centres", "Subject", "Ankle angles", "Force plates", "Recording")
-"""Titles of findings that stand above the figures."""
 ALWAYS = ("Uncertainty", "Adaptation")
 """Those that are said where they are no warning too."""
 
 
-def _print_verdict(console: Console, found: list[Insight]) -> None:
-    """Whether anything speaks against using the run; each warning with what to do about it."""
+def _print_verdict(console: Console, found: list[Insight], reasons: Sequence[str]) -> None:
+    """Whether anything speaks against using the run; then each warning, and what to do about it.
+
+    Args:
+        reasons: sentences that stand above, with the moments.
+    """
     said = [in_short(found), *(each.text for each in found if each.title in ALWAYS and each.level != "warning")]
     warned = [each for each in found if each.level == "warning"]
     console.print(f"Verdict: {' '.join(said)}", style="yellow" if warned else "green")
     for each in warned:
-        if each.title not in SAID_BEFORE:
-            console.print(f"  {each.title}: {each.text}", style="dim")
-        console.print(f"  {each.title}, what to do: {each.advice}", style="dim")
+        text = each.text
+        for reason in reasons:
+            text = text.replace(reason, "").strip()
+        if text:
+            console.print(f"  {each.title}: {text}", style="yellow")
+        if each.advice:
+            console.print(f"  {each.title}, what to do: {each.advice}", style="dim")
     console.print()
 
 
@@ -70,7 +69,7 @@ def end(result: Result) -> None:
     Raises:
         typer.Exit: there was something to say; code 1.
     """
-    wrong = [*result.failures.messages(), *filter(None, [why_lost(result.estimate)])]
+    wrong = [*map(str, result.failures.messages()), *filter(None, [why_lost(result.estimate)])]
     for message in wrong:
         print_error(message)
     if wrong:

@@ -12,9 +12,9 @@ from dynakin.filter.closure import plates_misfit
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.samples import in_step
 from dynakin.filter.tracker import Tracker
+from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
-from dynakin.results.records import IN_STEP
 
 Array = npt.NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class InStep(NamedTuple):
     tracker: Tracker
     arrays: dict[str, Array]
     shift_s: float
-    notes: list[str]
+    notes: list[Message]
 
 
 def run_in_step(
@@ -87,21 +87,24 @@ def is_late(delay: tuple[float, float] | None) -> bool:
     return delay is not None and abs(delay[0]) > max(LEAST_S, SIGMAS * delay[1])
 
 
-def in_words(shift_s: float, delay: tuple[float, float] | None) -> list[str]:
+def in_words(shift_s: float, delay: tuple[float, float] | None) -> list[Message]:
     """What was found about the plates' clock; empty where nothing was asked."""
     if delay is None:
         return []
     total, sd = shift_s + delay[0], delay[1]
     ahead = "behind" if total >= 0.0 else "ahead of"
     text = f"The plates are {1000.0 * abs(total):.1f} ms {ahead} the markers (standard deviation {1000.0 * sd:.1f} ms)"
-    return [f"{text}; {IN_STEP}" if shift_s else f"{text}."]
+    if shift_s:
+        return [note("in step", f"{text}; they were brought into step.")]
+    return [note("sum of the plates", f"{text}.")]
 
 
-def contradicted(delay_s: float, misfit_n: float, misfit_then_n: float) -> str:
+def contradicted(delay_s: float, misfit_n: float, misfit_then_n: float) -> Message:
     """That a delay which the fit asks for is not taken off, because the motion of the centre of mass is against it."""
     where = "behind" if delay_s >= 0.0 else "ahead of"
-    return (
+    return note(
+        "plates",
         f"By the fit the plates are {1000.0 * abs(delay_s):.0f} ms {where} the markers, by the motion of the centre of "
         f"mass they are not (their sum would be {misfit_then_n:.0f} N off it, not {misfit_n:.0f} N): no more was taken "
-        "off."
+        "off.",
     )

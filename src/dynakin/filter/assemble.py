@@ -20,6 +20,7 @@ from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import hidden_segments, with_sources
 from dynakin.filter.systematic import Systematic
 from dynakin.filter.taken import with_taken
+from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import ON_PLATE, UNMEASURED
@@ -45,7 +46,7 @@ def assemble(
     recording: Recording,
     measured: tuple[Array, Array],
     config: dict[str, Any],
-    notes: Sequence[str],
+    notes: Sequence[Message],
     covariances: tuple[Array, Array],
     used: Noise,
     feet: ContactLoads | None = None,
@@ -76,8 +77,9 @@ def assemble(
         beyond = impossible(feet, forces, recording.time, weight, soles)
         beyond &= ~np.isin(arrays["tracking"], NO_ESTIMATE_CODES)
         if beyond.any():
-            reasons.append(impossible_in_words(beyond, feet, forces, recording.time, weight, soles))
-            notes = [*notes, reasons[-1]]
+            said = impossible_in_words(beyond, feet, forces, recording.time, weight, soles)
+            reasons.append(said.text)
+            notes = [*notes, said]
     data = with_sources(
         whole,
         feet,
@@ -150,14 +152,14 @@ def _widen_priors(data: xr.Dataset, factor: float, blind: npt.NDArray[np.bool_])
     data.update({name: data[name].where(~these, factor * data[name]) for name, these in where.items()})
 
 
-def _without_infinities(data: xr.Dataset) -> list[str]:
+def _without_infinities(data: xr.Dataset) -> list[Message]:
     """Takes infinite numbers for what they are, not known; a sentence on each variable that has any."""
     said = []
     for name, variable in data.data_vars.items():
         count = int(np.isinf(variable.values).sum()) if variable.dtype.kind == "f" else 0
         if count:
             variable.values = finite(variable.values)
-            said.append(f"Warning: {name}: {count} numbers are infinite and left out.")
+            said.append(warning("numbers", f"{name}: {count} numbers are infinite and left out."))
     return said
 
 

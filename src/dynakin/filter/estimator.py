@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.skin import following_skin, may_follow
 from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
 from dynakin.filter.tracker import Tracker, known_lag
+from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.declared import with_contacts, with_loads
 from dynakin.model.definition import Definition
@@ -285,7 +286,9 @@ class Estimator:
             trial = Trial(recording.time, markers, wrench, on_feet)
             found = calibrated_noise(tracker, arrays, trial, late=not lag_s, progress=calibrating) if adapt else None
             if adapt and found is None:
-                notes.append("Too few frames are followed to calibrate the noise on them: it is as declared.")
+                notes.append(
+                    note("noise", "Too few frames are followed to calibrate the noise on them: it is as declared.")
+                )
             if not once:
                 skin = following_skin(tracker, arrays, recording.time) if scaled else None
                 seen = markers if skin is None else markers - skin.shift_m
@@ -294,15 +297,17 @@ class Estimator:
                 arrays = arrays if skin is None else skin.put_back(arrays)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        config = self.settings() | {"lag_s": lag_s, "ground_reasons": list(ground.reasons)}
+        config = self.settings() | {"lag_s": lag_s, "ground_reasons": [reason.text for reason in ground.reasons]}
         unsought = " No further delay of the plates is sought, because a wrong mass looks like one."
-        doubt = [ready.doubt + unsought] if ready.doubt else clock if ground.usable else []
+        doubt = (
+            [replace(ready.doubt, text=ready.doubt.text + unsought)] if ready.doubt else clock if ground.usable else []
+        )
         config["noise_used"] = tracker.noise.scales()
         notes += [*doubt, *ready.unsmoothed]
         plates = [plate.name for plate in recording.plates]
         if not ready.doubt:
-            text = off_place(ground, calibrated, tracker.core_model, arrays["state"], wrench, plates)
-            notes += [text] if text else []
+            place = off_place(ground, calibrated, tracker.core_model, arrays["state"], wrench, plates)
+            notes += [place] if place else []
         if tracker.systematic is not None:
             notes += tracker.systematic.misfit(arrays["state"][-1])
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)

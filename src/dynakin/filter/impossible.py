@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs, widened
 from dynakin.filter.contacts import ContactLoads
+from dynakin.messages import Message, warning
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE
 from dynakin.results.naming import listed
 
@@ -50,15 +51,16 @@ def impossible(feet: ContactLoads, wrench: Array, time: Array, weight: float, so
 
 def impossible_in_words(
     frames: Flags, feet: ContactLoads, wrench: Array, time: Array, weight: float, soles: Collection[str]
-) -> str:
+) -> Message:
     """A warning on these frames (T,), some of which there are; it names no plate, because none is to blame."""
     derived = frames[:, None] & _derived(feet, soles)
     push = np.where(derived, wrench[..., 1], 0.0) / weight
     spans = listed([f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(frames)], 4)
-    return (
-        f"Warning: no ground gives a foot the force that follows from the motion ({push.min():.1f} to "
+    return warning(
+        "recording",
+        f"no ground gives a foot the force that follows from the motion ({push.min():.1f} to "
         f"{push.max():.1f} times the weight): from {spans} such forces, and the moments that rest on them, are absent. "
-        "Look there for markers that jump, and check the recording's rate and the mass."
+        "Look there for markers that jump, and check the recording's rate and the mass.",
     )
 
 

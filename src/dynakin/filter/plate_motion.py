@@ -20,7 +20,6 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.plates.axes import TURNS, PlateAxes, turned_feet
 from dynakin.recordings.recording import Plate, Recording, rate_of
 from dynakin.results.naming import listed
-from dynakin.results.records import OFF_RATE
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -138,9 +137,10 @@ def fitting_rate(needed: Needed, force: Array) -> tuple[float, float] | None:
 
 
 def wrong_rate_in_words(rate: float, fitting: float, slope: float) -> str:
-    """A warning, with the rate that would fit."""
+    """That it does not, with the rate that would."""
     return (
-        f"{OFF_RATE}{rate:.4g} Hz: by the plates the centre of mass accelerates {slope:.2f} times as much as by the "
+        f"movement and forces do not fit each other at {rate:.4g} Hz: by the plates the centre of mass accelerates "
+        f"{slope:.2f} times as much as by the "
         f"markers, expected {SLOPE[0]:g} to {SLOPE[1]:g}. About {fitting:.3g} Hz would fit. Correct the rate, or the "
         "times, in the files of markers and forces; until then speeds, moments and what is said of other loads are "
         "wrong."

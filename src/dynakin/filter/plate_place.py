@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.filter.total_wrench import Ground
+from dynakin.messages import Message, about, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.naming import listed
-from dynakin.results.records import OFF_PLACE, OFF_RATE, WARNING
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -28,8 +28,8 @@ BEARS = 0.3
 
 def off_place(
     ground: Ground, initial: CalibratedModel, model: _core.Model, states: Array, measured: Array, names: Sequence[str]
-) -> str:
-    """A warning where the plates' sum presses beside where the estimated movement needs it, "" where it does not: all
+) -> Message | None:
+    """A warning where the plates' sum presses beside where the estimated movement needs it, None where it does not: all
     of them, or one while it bears alone (opposite errors leave no sum).
 
     The movement is that of the inertia before the first frame: the estimated one makes up for plates off their place.
@@ -38,8 +38,8 @@ def off_place(
         states: (T, n). measured: (T, 6) total wrench by the plates. names: of the plates.
     """
     loads, weight = ground.loads, initial.weighed_kg * GRAVITY_M_S2
-    if loads is None or not names or initial.contacts or any(OFF_RATE in text for text in ground.notes):
-        return ""
+    if loads is None or not names or initial.contacts or about(ground.notes, "rate"):
+        return None
     limit = OFF_PLACE_M + OFF_UNSEEN_M * initial.unseen_kg / initial.weighed_kg
     inertia = [k for k, name in enumerate(initial.names) if name.startswith("inertia/")]
     posed = states.copy()
@@ -57,14 +57,16 @@ def off_place(
     by_name = {name: _apart(apart[own], loads.soles.rate, limit) for name, own in {whole: bears, **cases}.items()}
     found = {name: by for name, by in by_name.items() if by is not None}
     if not found:
-        return ""
+        return None
     if whole in found:
         found = {whole: found[whole]}
     said = [f"{name} by {np.hypot(*by):.2f} m (X {by[0]:+.2f}, Z {by[1]:+.2f})" for name, by in found.items()]
-    return (
-        f"{WARNING}{OFF_PLACE}: {listed(said)}, ground frame, "
-        f"expected within {limit:.2f} m. Either the plates lie elsewhere than the file says (corners, origin, centres "
-        "of pressure), or something else steadies the person."
+    return warning(
+        "place",
+        f"by the movement the force does not act where the plates have it: {listed(said)}, ground frame, expected "
+        "within "
+        f"{limit:.2f} m. Either the plates lie elsewhere than the file says (corners, origin, centres of pressure), or "
+        "something else steadies the person.",
     )
 
 

@@ -13,6 +13,7 @@ from dynakin.filter.labels import labels
 from dynakin.filter.sources import ContactSources, hidden_segments
 from dynakin.filter.total_wrench import Ground
 from dynakin.filter.tracker import Tracker
+from dynakin.messages import Message
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, source_figures
@@ -42,8 +43,8 @@ class Prepared:
     ground: Ground
     contacts: ContactLoads | None
     lag_s: float
-    doubt: str | None
-    unsmoothed: tuple[str, ...]
+    doubt: Message | None
+    unsmoothed: tuple[Message, ...]
 
     @property
     def calibrated(self) -> CalibratedModel:
@@ -51,7 +52,7 @@ class Prepared:
         return self.tracker.calibrated
 
     @property
-    def messages(self) -> list[str]:
+    def messages(self) -> list[Message]:
         """What there is to say of the recording, the model and the plates, in the words of a run."""
         doubt = [self.doubt] if self.doubt else []
         return [*self.recording.notes, *self.calibrated.messages, *self.ground.notes, *doubt, *self.unsmoothed]
@@ -80,4 +81,4 @@ class Prepared:
         data = xr.Dataset(coords=labels(self.tracker.core_model, calibrated, self.recording.time, self.contacts))
         if self.contacts is not None:
             data = data.isel(foot=[name != RESIDUAL for name in self.contacts.names])
-        return source_figures(data, sources, self.ground.reasons)
+        return source_figures(data, sources, [reason.text for reason in self.ground.reasons])

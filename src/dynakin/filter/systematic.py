@@ -19,12 +19,12 @@ from dynakin.filter.error_sizes import KINDS, OF_JOINTS, Sizes, less_sure_joints
 from dynakin.filter.joint_errors import JointErrors, floats
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.filter.reported_sd import BLOCKS, Parts, movement_intensity, reported
+from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import in_use, moment_sources
-from dynakin.results.records import MISPLACED
 from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
@@ -283,15 +283,18 @@ class Systematic:
             return np.zeros(x.shape[:-1])
         return np.asarray(np.linalg.norm(x[..., self._places] - self._place0, axis=-1).mean(axis=-1))
 
-    def misfit(self, x: Array) -> list[str]:
+    def misfit(self, x: Array) -> list[Message]:
         """What there is to say of how well the model was scaled to the person, by the last state (n,)."""
         moved_m = float(self.moved_m(x))
         if not moved_m > self.sizes.placed * MISFIT:
             return []
         return [
-            f"Warning: {MISPLACED} {1000.0 * moved_m:.0f} mm (mean) from where the model has them, of a model that "
-            f"fits the person at most {1000.0 * self.sizes.placed:.0f} mm: the centres of its joints count as "
-            f"{moved_m / self.sizes.placed:.1f} times less sure, and axes that are turned as well do not."
+            warning(
+                "scaling",
+                f"markers lie {1000.0 * moved_m:.0f} mm (mean) from where the model has them, of a model that "
+                f"fits the person at most {1000.0 * self.sizes.placed:.0f} mm: the centres of its joints count as "
+                f"{moved_m / self.sizes.placed:.1f} times less sure, and axes that are turned as well do not.",
+            )
         ]
 
     def intensity(self, data: xr.Dataset) -> Array:

@@ -10,10 +10,10 @@ import numpy.typing as npt
 from dynakin.arrays import rms
 from dynakin.filter.reported_sd import BLOCKS
 from dynakin.filter.systematic import Systematic
+from dynakin.messages import Message, note, warning
 from dynakin.recordings.low_passed import LowPass
 from dynakin.results.estimate import values_of
 from dynakin.results.naming import sentence, words
-from dynakin.results.records import LOW_PASSED
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,16 +32,19 @@ TOO_LOW_HZ = 4.5
 (`truth3d`) at 3 Hz 60 % of speeds, at 4 Hz 77 to 88 %, at 6 Hz 92 to 100 %."""
 
 
-def with_taken(data: xr.Dataset, low_pass: LowPass, systematic: Systematic | None) -> tuple[xr.Dataset, str]:
+def with_taken(data: xr.Dataset, low_pass: LowPass, systematic: Systematic | None) -> tuple[xr.Dataset, Message]:
     """``data`` with deviations that hold what the filter took of each coordinate, and a sentence.
 
     Args:
         systematic: gives what moments change by; those of a model that is fixed in the ground stay.
     """
     cutoff = f"{low_pass.cutoff_hz:.0f} Hz"
-    text = f"{LOW_PASSED} about {cutoff}, or were computed by a model: nothing of the cameras' noise is left above"
+    text = (
+        f"the markers look low-passed at about {cutoff}, or were computed by a model: nothing of the cameras' noise is "
+        "left above"
+    )
     if low_pass.cutoff_hz > HIGH_HZ:
-        return data, f"{sentence(text)}. That takes little but of impacts."
+        return data, note("low-passed", f"{sentence(text)}. That takes little but of impacts.")
     lost = _taken(values_of(data, "coordinates"), low_pass)
     if systematic is not None:
         lost.append(np.nan_to_num(systematic.moments_moved(data, lost)))
@@ -60,14 +63,17 @@ def with_taken(data: xr.Dataset, low_pass: LowPass, systematic: Systematic | Non
                 "that rest on these are too small, whatever else is said of them"
             )
         name = words(str(data["coordinate"].values[k]))
-        text = f"Warning: {text}. The filter took some {np.degrees(speed[k]):.0f} deg/s of the speed of {name}, {hold}."
+        message = warning(
+            "low-passed",
+            f"{text}. The filter took some {np.degrees(speed[k]):.0f} deg/s of the speed of {name}, {hold}.",
+        )
     else:
-        text = f"{sentence(text)}. The filter took little of this movement."
+        message = note("low-passed", f"{sentence(text)}. The filter took little of this movement.")
     wider = {
         f"{block}_sd": (("time", "coordinate"), np.where(sd > 0.0, np.hypot(sd, size), sd))
         for block, sd, size in zip(BLOCKS, said, sizes, strict=False)
     }
-    return data.assign(wider), text
+    return data.assign(wider), message
 
 
 def _taken(q: Array, low_pass: LowPass) -> list[Array]:

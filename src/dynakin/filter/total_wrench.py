@@ -23,6 +23,7 @@ from dynakin.filter.plate_motion import (
     turned_axes,
     wrong_rate_in_words,
 )
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
@@ -35,7 +36,6 @@ from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.force_unit import likely_unit
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
-from dynakin.results.records import IN_STEP, WARNING
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -75,8 +75,8 @@ class Ground:
     bears: Flags
     usable: bool
     load_ratio: float | None
-    notes: tuple[str, ...]
-    reasons: tuple[str, ...]
+    notes: tuple[Message, ...]
+    reasons: tuple[Message, ...]
 
 
 def foot_markers(initial: CalibratedModel) -> dict[str, list[str]]:
@@ -121,7 +121,8 @@ def known_ground(
             "No force plates: the ground reaction follows from the motion where one foot may stand, and where both may "
             "how they divide it is assumed; inertial parameters stay as the table has them."
         )
-        return Ground(loads, np.zeros(n, dtype=bool), may, False, None, (text,), (text,)), wrench
+        said = note("plates", text)
+        return Ground(loads, np.zeros(n, dtype=bool), may, False, None, (said,), (said,)), wrench
     # steps off the plates: their mean load is no mass
     mass = None if initial.feet else initial.weighed_kg
     steps_kg = initial.weighed_kg if initial.feet and not initial.contacts else None
@@ -134,7 +135,7 @@ def known_ground(
         if loads is not None:  # the recording keeps its plates, with nobody on any
             loads = replace(loads, on=np.zeros((n, len(loads.feet), len(recording.plates)), dtype=bool))
         return replace(ground, loads=loads, notes=(*check.messages, *ground.notes)), nothing
-    off_rate = list[str]()
+    off_rate = list[Message]()
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
         if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
@@ -145,10 +146,10 @@ def known_ground(
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
         found = None if initial.contacts else fitting_rate(needed, total)
         if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
-            off_rate = [f"{WARNING}{wrong_rate_in_words(needed.rate, *found)}"]
+            off_rate = [warning("rate", wrong_rate_in_words(needed.rate, *found))]
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
     judged = _judged(recording, initial, markers, wrench, loads, check, may, by_plate, tolerance)
-    notes = [*off_rate, *check.messages, *([f"Warning: {turned}."] if turned else []), *judged.notes]
+    notes = [*off_rate, *check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
     reasons = [*judged.reasons]
     undeclared = judged.undeclared
     if loads is not None:
@@ -160,7 +161,7 @@ def known_ground(
     wrench = np.where(partly[:, None], np.nan, wrench)
     used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
     if loads is not None or used < n:
-        notes.append(f"The total wrench is measured in {used} of {n} frames.")
+        notes.append(note("plates", f"The total wrench is measured in {used} of {n} frames."))
     notes += reasons
     return Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, tuple(notes), tuple(reasons)), wrench
 
@@ -182,7 +183,7 @@ def _loads_of_feet(
         f"No markers of the {' and the '.join(initial.unmarked_feet)} foot: what it carries is not known. Moments are "
         "those of a leg whose own foot is on a plate, or in the air."
     )
-    return replace(loads, reasons=(*loads.reasons, text))
+    return replace(loads, reasons=(*loads.reasons, note("plates", text)))
 
 
 def _declared_contacts(initial: CalibratedModel, markers: Array, loads: FootLoads | None) -> tuple[Flags, list[bool]]:
@@ -202,8 +203,8 @@ class _Judged(NamedTuple):
     undeclared: Flags
     beyond: Flags
     load_ratio: float | None
-    notes: list[str]
-    reasons: list[str]
+    notes: list[Message]
+    reasons: list[Message]
 
 
 def _judged(
@@ -218,13 +219,15 @@ def _judged(
     tolerance: float | None,
 ) -> _Judged:
     """Whether the plates carry what the motion needs, where feet and plates say that they carry the person."""
-    n, names, notes, reasons = recording.n_frames, list(initial.contacts), list[str](), list[str]()
+    n, names, notes, reasons = recording.n_frames, list(initial.contacts), list[Message](), list[Message]()
     measured: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
     claimed = measured if loads is None else loads.total_known
     undeclared = np.zeros(n, dtype=bool) if loads is None else loads.elsewhere.copy()
     beyond = np.zeros((n, len(initial.feet)), dtype=bool)
     if not measured.all():
-        reasons.append(f"The plates are not measured in {n - int(measured.sum())} of {n} frames.")
+        reasons.append(
+            note("sum of the plates", f"The plates are not measured in {n - int(measured.sum())} of {n} frames.")
+        )
     if loads is not None:
         notes += [text for text in loads.messages if text not in loads.reasons]
         reasons += loads.reasons
@@ -233,10 +236,12 @@ def _judged(
         flies = loads is not None and bool(loads.aloft.all(axis=1).any())  # which weighs nobody
         foreign = None if flies or names else _foreign_load(check, wrench, claimed, initial, tolerance)
         reasons += [foreign] if foreign else []
-        return _Judged(may, undeclared | (foreign is not None), beyond, None, [*notes, UNJUDGED], reasons)
+        return _Judged(
+            may, undeclared | (foreign is not None), beyond, None, [*notes, note("plates", UNJUDGED)], reasons
+        )
     bears = bearing(found, may, names, by_plate, claimed, recording.rate)
     if bears.any():
-        reasons.append(_declared_in_words(found, bears, names, recording.time))
+        reasons.append(note("plates", _declared_in_words(found, bears, names, recording.time)))
         found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
     undeclared |= found.undeclared | _nearly_all(found)
     if found.undeclared.any():
@@ -246,27 +251,35 @@ def _judged(
         undeclared |= claimed
         beyond = beyond | claimed[:, None]
         reasons.append(
-            f"Warning: the plates carry {found.too_much:.2f} times what the motion needs of "
-            f"{initial.weighed_kg:.1f} kg, all the time: their scale or the mass is wrong, or a load is not "
-            "declared. No moment of the legs is given there. Check the plates' units, --mass, and [[loads]]."
+            warning(
+                "weight",
+                f"the plates carry {found.too_much:.2f} times what the motion needs of "
+                f"{initial.weighed_kg:.1f} kg, all the time: their scale or the mass is wrong, or a load is not "
+                "declared. No moment of the legs is given there. Check the plates' units, --mass, and [[loads]].",
+            )
         )
     if found.unjudged > MANY * n:
         notes.append(
-            f"In {found.unjudged} of {n} frames too few markers are seen to check that the plates carry the person."
+            note(
+                "plates",
+                f"In {found.unjudged} of {n} frames too few markers are seen to check that the plates carry the "
+                "person.",
+            )
         )
     return _Judged(bears, undeclared, beyond, found.load_ratio, notes, reasons)
 
 
-def _light_feet(before: FootLoads, loads: FootLoads, beyond: Flags) -> list[str]:
+def _light_feet(before: FootLoads, loads: FootLoads, beyond: Flags) -> list[Message]:
     """Sentences on feet whose plate was measured and reads next to nothing where something undeclared bears."""
-    found = []
+    found = list[Message]()
     for k, foot in enumerate(loads.feet):
         light = (loads.reason[:, k] != before.reason[:, k]) & (before.reason[:, k] == on_plates.MEASURED)
         if (light & ~beyond[:, k]).any():
-            found.append(
+            text = (
                 f"In {np.count_nonzero(light & ~beyond[:, k])} of these frames the {foot} foot's plate reads less "
                 f"than {LOADED_N:g} N: what the foot carries there is not known."
             )
+            found.append(note("plates", text))
     return found
 
 
@@ -282,8 +295,8 @@ def _brought_into_step(
     there = brought_into_step(recording, delay_s)
     wrench = initial.ground.wrench_to_ground(there.total_wrench())
     ground, known = known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
-    text = f"{out_of_step_in_words(delay_s)}; {IN_STEP}"
-    return replace(ground, notes=(text, *ground.notes)), known
+    said = note("in step", f"{out_of_step_in_words(delay_s)}; they were brought into step.")
+    return replace(ground, notes=(said, *ground.notes)), known
 
 
 def _nearly_all(found: Closure) -> bool:
@@ -308,7 +321,7 @@ def _declared_in_words(found: Closure, bears: Flags, names: list[str], time: Arr
 
 def _undeclared_in_words(
     found: Closure, recording: Recording, initial: CalibratedModel, markers: Array, wrench: Array
-) -> tuple[str, Flags]:
+) -> tuple[Message, Flags]:
     """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts."""
     time, feet = recording.time, foot_markers(initial)
     beyond = np.zeros((len(time), len(feet)), dtype=bool)
@@ -319,10 +332,14 @@ def _undeclared_in_words(
         named = likely_unit(load * GRAVITY_M_S2, initial.weighed_kg)
         unit = f", or the forces are in {named}, not N" if named else ""
         return (
-            f"Warning: the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
-            f"(by the motion {load + float(np.nanmean(found.excess[judged, 1])) / GRAVITY_M_S2:.1f} kg): the mass is "
-            "wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, a "
-            f"weight, a cable, a rail){unit}. The plates are not used for the total."
+            warning(
+                "weight",
+                f"the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
+                f"(by the motion {load + float(np.nanmean(found.excess[judged, 1])) / GRAVITY_M_S2:.1f} kg): the mass "
+                "is "
+                "wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, a "
+                f"weight, a cable, a rail){unit}. The plates are not used for the total.",
+            )
         ), beyond
     spans, sizes, away = list[str](), list[tuple[float, int]](), list[float]()
     for first, end in runs(found.undeclared):
@@ -347,31 +364,35 @@ def _undeclared_in_words(
     size, axis = max(sizes, key=lambda pair: abs(pair[0]))
     near = f", {min(away):.2f} m or more from the feet" if away and not beyond.any() else ""
     return (
-        f"Warning: the plates carry up to {abs(size):.0f} N {'less' if size > 0.0 else 'more'} "
-        f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({abs(size) / weight:.0%} of the weight, "
-        f"expected within {found.limits[0]:.0%}, and {found.limits[1]:.0%} for longer than a second): something that "
-        "no plate measures bears or pulls the person there (a seat, a "
-        f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The plates' sum is not used there."
+        warning(
+            "plates",
+            f"the plates carry up to {abs(size):.0f} N {'less' if size > 0.0 else 'more'} "
+            f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({abs(size) / weight:.0%} of the weight, "
+            f"expected within {found.limits[0]:.0%}, and {found.limits[1]:.0%} for longer than a second): something "
+            "that no plate measures bears or pulls the person there (a seat, a "
+            f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The plates' sum is not used there.",
+        )
     ), beyond
 
 
-def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unseen_kg: float = 0.0) -> str | None:
+def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unseen_kg: float = 0.0) -> Message | None:
     """Sentences where the plates contradict the mass: by `Ground.load_ratio`, or, where that is not known, by the mean
     vertical force of the known frames of the wrench (T, 6)."""
     load = _mean_load_kg(wrench, least=50) if load_ratio is None else load_ratio * mass_kg
     within = MASS_APART + UNSEEN_APART * unseen_kg / mass_kg
     if load is None or abs(load - mass_kg) <= within * mass_kg:
         return None
-    return (
-        f"Warning: the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
+    return warning(
+        "weight",
+        f"the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
         f"({100.0 * abs(load - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
-        "mass. Forces, moments and inertia take the error on."
+        "mass. Forces, moments and inertia take the error on.",
     )
 
 
 def _foreign_load(
     check: PlateCheck, wrench: Array, claimed: Flags, initial: CalibratedModel, tolerance: float | None
-) -> str | None:
+) -> Message | None:
     """A sentence where the plates' mean load is not the person's weight, for recordings that `closure` cannot judge.
 
     Args:
@@ -384,10 +405,11 @@ def _foreign_load(
         load, mean = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg, ""
     if tolerance is None or load is None or abs(load - mass_kg) <= tolerance * mass_kg:
         return None
-    return (
-        f"Warning: the plates carry {load:.1f} kg{mean} where the person weighs {mass_kg:.1f} kg (more than "
+    return warning(
+        "weight",
+        f"the plates carry {load:.1f} kg{mean} where the person weighs {mass_kg:.1f} kg (more than "
         f"{100.0 * tolerance:.0f} % apart): the mass is wrong, or something that the model does not have bears on them "
-        "(a weight, a cable, a rail, a foot off the plates). The plates are not used for the total."
+        "(a weight, a cable, a rail, a foot off the plates). The plates are not used for the total.",
     )
 
 

@@ -20,11 +20,12 @@ from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sources import ContactSources, LiveSight
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.filter.systematic import Systematic, stands_off_plates
+from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import ABSENT, MEASURED
-from dynakin.results.records import NO_ESTIMATE, NOT_SMOOTHED
+from dynakin.results.records import NO_ESTIMATE
 from dynakin.settings.lag import ALL_FRAMES, LIVE_LAG_S, check_lag
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
@@ -385,7 +386,7 @@ def can_smooth(noise: Noise) -> bool:
     return noise.constraint in SMOOTHED_WITH
 
 
-def known_lag(asked_s: float | None, noise: Noise) -> tuple[float, list[str]]:
+def known_lag(asked_s: float | None, noise: Noise) -> tuple[float, list[Message]]:
     """The lag of a recording's estimate, s: as asked, else all frames wherever these settings have a smoother; a
     sentence where not.
 
@@ -399,10 +400,11 @@ def known_lag(asked_s: float | None, noise: Noise) -> tuple[float, list[str]]:
         return float(asked_s), []
     if can_smooth(noise):
         return ALL_FRAMES, []
-    return 0.0, [
-        f"{NOT_SMOOTHED} bounds are kept by constraint {noise.constraint!r}, which has no smoother; each frame is "
+    text = (
+        f"Not smoothed: bounds are kept by constraint {noise.constraint!r}, which has no smoother; each frame is "
         "estimated from the frames until then, as it would be live."
-    ]
+    )
+    return 0.0, [note("smoothing", text)]
 
 
 def live_lag(asked_s: float | None, noise: Noise) -> float:

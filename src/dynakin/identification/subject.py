@@ -17,10 +17,10 @@ from dynakin.identification.observability.element_words import base_words
 from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.identification.report import in_words
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
+from dynakin.messages import Message, warning, warnings_of
 from dynakin.model.identified import Batch, HeldOut, IdentifiedSubject
 from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
-from dynakin.results.records import WARNING, warnings_of
 
 Array = npt.NDArray[np.float64]
 
@@ -43,8 +43,8 @@ class Identification:
     trials: tuple[MeasuredTrial, ...]
     posterior: Posterior
     decision: Decision
-    lost: tuple[str, ...] = ()
-    warned: tuple[str, ...] = ()
+    lost: tuple[Message, ...] = ()
+    warned: tuple[Message, ...] = ()
 
 
 def identify_subject(
@@ -78,7 +78,7 @@ def identify_subject(
         mass_kg=common.initial.mass_kg,
         use=decision.use,
         trials=tuple(trial.movement.recording.name for trial in trials),
-        report=(*lost, *said, *in_words(decision, posterior, batch)),
+        report=(*map(str, (*lost, *said)), *in_words(decision, posterior, batch)),
         held_out=HeldOut(
             parts=decision.folds,
             components=decision.components,
@@ -90,25 +90,25 @@ def identify_subject(
     return Identification(subject, common, tuple(trials), posterior, decision, tuple(lost), said)
 
 
-def warned(common: Common, trials: Sequence[MeasuredTrial]) -> tuple[str, ...]:
+def warned(common: Common, trials: Sequence[MeasuredTrial]) -> tuple[Message, ...]:
     """Warnings of the calibrations: first of the subject, then of trials what was not said before."""
     said = warnings_of(common.initial.messages)
     for movement in (trial.movement for trial in trials):
-        mine = [text for text in warnings_of(movement.start.messages) if text not in said]
-        said += [f"{WARNING}{movement.recording.name}: {text.removeprefix(WARNING)}" for text in mine]
+        mine = [message for message in warnings_of(movement.start.messages) if message not in said]
+        said += [message.of(movement.recording.name) for message in mine]
     return tuple(said)
 
 
 def _followed(
     estimator: Estimator, recordings: Sequence[Recording], static: Recording | None, progress: Progress
-) -> tuple[Common, list[MeasuredTrial], list[str]]:
+) -> tuple[Common, list[MeasuredTrial], list[Message]]:
     """The trials in which the filter followed the person, and a sentence on each of the others."""
     common, lost = Common.measure(estimator, recordings[0], static), dict[int, str]()
     trials = measure_all(common, recordings, progress, lost)
     if len(trials) < min(len(recordings), 2):
         left = "one trial is" if trials else "no trial is"
         raise LostError(f"{'; '.join(lost.values())}; {left} left to identify on, nothing is saved")
-    said = [f"Warning: left out: {reason}." for reason in lost.values()]
+    said = [warning("lost", f"left out: {reason}.") for reason in lost.values()]
     if 0 in lost and static is None:  # the lengths were measured on it
         kept = [recording for k, recording in enumerate(recordings) if k not in lost]
         common, trials, more = _followed(estimator, kept, static, progress)

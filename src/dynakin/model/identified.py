@@ -18,6 +18,7 @@ from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.errors import ModelError
 from dynakin.files import LARGEST_TEXT, read_bytes
+from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.settings.strict import Strict, read_toml, validate
@@ -240,7 +241,7 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
     if subject.use == "table":
         gain = "" if subject.held_out is None else f"; with the identified inertia {subject.held_out.in_words()}"
         message = f"Identified parameters: the table is kept{gain}."
-        return replace(initial, messages=(*initial.messages, message))
+        return replace(initial, messages=(*initial.messages, note("calibration", message)))
     scale = initial.mass_kg / subject.mass_kg  # the same body, weighed anew
     values = scale * np.array(subject.batch.values)
     covariance = scale**2 * np.array(subject.batch.covariance)
@@ -273,5 +274,5 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
         lower=lower,
         upper=upper,
         joint_prior=found if initial.joint_prior is None else initial.joint_prior.with_known(found),
-        messages=(*initial.messages, message),
+        messages=(*initial.messages, note("calibration", message)),
     )

@@ -141,7 +141,7 @@ class Result:
                 with self.failures.stage("what failed, in the files"):  # these stay as they were saved
                     self._write(folder, overwrite=True)
         if check and self.failures.found:
-            said = " ".join(self.failures.messages())
+            said = " ".join(map(str, self.failures.messages()))
             raise OutputError(f"{folder}: the results are saved ({LOG} has details). {said}")
         return folder
 
@@ -206,7 +206,7 @@ class Result:
                 failed,
                 lambda path: self._write_page(whole, metrics, path),
             )
-            said = {"messages": [*estimate.messages, *failed.messages()]}
+            said: dict[str, Any] = {"messages": list(map(str, whole.messages))}
             said["failures"] = [failure.stage for failure in failed.found]
             write_metrics(metrics | said, made / "metrics.json")
             if failed.found:

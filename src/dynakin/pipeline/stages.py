@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
+from dynakin.messages import note
 from dynakin.progress import Progress, stage
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
@@ -238,9 +239,9 @@ def judged(
     observed: Identifiability | None = None
     if observability:
         with failures.stage("observability of the constants"):
-            observed, note = _observability(trackers[title], first, structure)
-            if note:
-                first = replace(first, messages=[*first.messages, f"{_LEFT_OUT}: {note}"])
+            observed, why_not = _observability(trackers[title], first, structure)
+            if why_not:
+                first = replace(first, messages=[*first.messages, note("results", f"{_LEFT_OUT}: {why_not}")])
     return Result(first, initial, comparison, observed, case.config, failures)
 
 

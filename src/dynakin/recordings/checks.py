@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from dynakin.messages import Message, Topic, note, warning
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NEAR_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
@@ -59,28 +60,28 @@ class PlateCheck:
             plates, or where a sole reaches over a plate's edge.
         mean_mass_kg: the same from the mean over all loaded frames of a movement; right only where it ends as it
             began and nothing but the ground pushes. None where the person stands still, or nothing is loaded.
-        messages: sentences with numbers; those of something wrong begin with "Warning:".
+        messages: sentences with numbers; warnings of what is wrong.
         refusal: why the plates cannot be used, None where they can. The caller decides what follows from it.
         unused: they carry nobody although a foot may be on them: a run does without them.
     """
 
     mass_kg_from_plates: float | None
     mean_mass_kg: float | None
-    messages: tuple[str, ...]
+    messages: tuple[Message, ...]
     refusal: str | None
     unused: bool = False
 
 
 @dataclass
 class _Findings:
-    messages: list[str] = field(default_factory=list)
+    messages: list[Message] = field(default_factory=list)
     refusals: list[str] = field(default_factory=list)
 
-    def say(self, text: str) -> None:
-        self.messages.append(text)
+    def say(self, text: str, topic: Topic = "plates") -> None:
+        self.messages.append(note(topic, text))
 
-    def warn(self, text: str) -> None:
-        self.messages.append(f"Warning: {text}")
+    def warn(self, text: str, topic: Topic = "plates") -> None:
+        self.messages.append(warning(topic, text))
 
     def refuse(self, text: str) -> None:
         self.refusals.append(text)
@@ -119,7 +120,7 @@ def check_plates(
     feet = {foot: place[:, :, [0, 2]] for foot, place in places.items()}
     if mass_kg is None and (idle := _idle(recording, ground, feet, steps_kg)):
         findings.messages.append(idle)
-        return PlateCheck(None, None, tuple(findings.messages), None, unused=idle.startswith("Warning"))
+        return PlateCheck(None, None, tuple(findings.messages), None, unused=idle.level == "warning")
     mass = _check_vertical(recording, ground, mass_kg, steps_kg, standing, findings)
     if loads is None:
         loads = foot_loads(recording, ground, foot_markers or {})
@@ -161,21 +162,24 @@ def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame
     return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
 
 
-def _idle(recording: Recording, ground: GroundFrame, feet: Mapping[str, Array], steps_kg: float | None) -> str:
+def _idle(
+    recording: Recording, ground: GroundFrame, feet: Mapping[str, Array], steps_kg: float | None
+) -> Message | None:
     """A sentence on plates none of which is ever loaded, a warning unless their corners and the feet (T, K, 2) show
-    that nobody steps on them: under a foot they are dead, or in another unit. Empty where one is loaded."""
+    that nobody steps on them: under a foot they are dead, or in another unit. None where one is loaded."""
     pushes = [np.nan_to_num(ground.vectors_to_ground(plate.force)[:, 1]) for plate in recording.plates]
     most = max(np.abs(push).max() for push in pushes)
     if most > JUDGED_N:
-        return ""
+        return None
     if len(feet) > 1 and all(_beside(plate, ground, feet) for plate in recording.plates):
-        return "Nobody steps on the plates: they carry nothing, and no foot is on any."
+        return note("plates", "Nobody steps on the plates: they carry nothing, and no foot is on any.")
     unit = likely_unit(while_loaded(np.sum(pushes, axis=0)), steps_kg)
     perhaps = f", and whether they are in {unit}, not N" if unit else ""
-    return (
-        f"Warning: the plates carry nobody in this recording (they read {most:.1f} N at most): it is run as one "
+    return warning(
+        "plates",
+        f"the plates carry nobody in this recording (they read {most:.1f} N at most): it is run as one "
         "without plates, and the ground reaction follows from the motion. If somebody steps on them, look whether "
-        f"their channels were connected{perhaps}."
+        f"their channels were connected{perhaps}.",
     )
 
 
@@ -254,7 +258,7 @@ def _check_vertical(
         )
         return None
     mass = vertical / GRAVITY_M_S2
-    findings.say(f"Vertical force {vertical:.1f} N, that is {mass:.2f} kg ({when}).")
+    findings.say(f"Vertical force {vertical:.1f} N, that is {mass:.2f} kg ({when}).", "weight")
     tilt = float(np.degrees(np.arctan2(np.hypot(mean[0], mean[2]), vertical)))
     if tilt > TILT_WARNING_DEG:
         findings.warn(f"the mean force is {tilt:.0f} deg off the vertical {ground.vertical}, expected a few degrees.")
@@ -294,11 +298,11 @@ def _compare_mass(mass: float, declared: float, standing: bool, findings: _Findi
     if standing and not MASS_RATIO_REFUSED[0] < ratio < MASS_RATIO_REFUSED[1]:
         findings.refuse(f"{text}; wrong unit, or a plate is missing")
     elif standing and abs(ratio - 1) > MASS_WARNING:
-        findings.warn(f"{text}.")
+        findings.warn(f"{text}.", "weight")
     elif not standing and not MASS_MEAN_RATIO[0] < ratio < MASS_MEAN_RATIO[1]:
-        findings.warn(f"{text}, on average over all loaded frames; another force may act on the plates.")
+        findings.warn(f"{text}, on average over all loaded frames; another force may act on the plates.", "weight")
     else:
-        findings.say(f"Mass: {text}.")
+        findings.say(f"Mass: {text}.", "weight")
 
 
 def _feet(

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import wrench_about
 from dynakin.errors import RecordingError
+from dynakin.messages import Message, note
 from dynakin.recordings.limits import check_markers, check_wrench
 from dynakin.recordings.signals import AnalogChannel, Event
 
@@ -116,7 +117,7 @@ class Recording:
     markers: Array
     plates: tuple[Plate, ...] = ()
     length_unit: Literal["mm", "m"] = "m"
-    notes: tuple[str, ...] = ()
+    notes: tuple[Message, ...] = ()
     subject: dict[str, float] = field(default_factory=dict)
     hints: dict[str, str] = field(default_factory=dict)
     read_with: dict[str, Any] = field(default_factory=dict)
@@ -195,7 +196,7 @@ class Recording:
         moment = np.sum([plate.moment for plate in self.plates], axis=0)
         return wrench_about(np.hstack([force, moment]), np.asarray(about, dtype=float))
 
-    def with_plates(self, plates: tuple[Plate, ...], notes: tuple[str, ...] = ()) -> Recording:
+    def with_plates(self, plates: tuple[Plate, ...], notes: tuple[Message, ...] = ()) -> Recording:
         """The same recording with these plates instead of its own, and with further notes."""
         return replace(self, plates=tuple(plates), notes=self.notes + notes)
 
@@ -227,8 +228,8 @@ class Recording:
         if not left_out:
             return self
         part = self._part(keep)
-        note = f"Fewer than a quarter of the markers are seen in {' and '.join(left_out)}: they are left out."
-        return replace(part, notes=(*self.notes, note))
+        text = f"Fewer than a quarter of the markers are seen in {' and '.join(left_out)}: they are left out."
+        return replace(part, notes=(*self.notes, note("recording", text)))
 
     def _part(self, keep: slice) -> Recording:
         """These frames; the times stay as they are."""

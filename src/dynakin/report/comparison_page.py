@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import tomli_w
 
+from dynakin.messages import Message, warnings_of
 from dynakin.report.findings.finding import Insight
 from dynakin.report.page import render_page
 from dynakin.report.sections.methods import ABOUT_TABLE2, about_methods, angle_part, moment_part, wrench_part
@@ -16,7 +17,6 @@ from dynakin.report.sections.section import Section
 from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_text, truth_text, unseen_text
 from dynakin.results.files.config import plain, versions
 from dynakin.results.naming import listed, number, plural, sentence
-from dynakin.results.records import WARNING
 from dynakin.units import COMPONENTS
 from dynakin.validation.methods import Trial
 from dynakin.validation.table2 import MARKERS, Row
@@ -42,7 +42,7 @@ def render_comparison(
     tables: Mapping[str, Sequence[Any]],
     settings: Sequence[Mapping[str, Any]],
     names: Sequence[str],
-    notes: Sequence[str] = (),
+    notes: Sequence[Message] = (),
 ) -> str:
     """A comparison as one HTML text that needs nothing else.
 
@@ -54,7 +54,8 @@ def render_comparison(
     """
     judged = not trials and len(names) == 2
     title = f"{names[0]} → {names[1]}" if judged else names[0] if len(names) == 1 else f"{len(names)} trials"
-    messages = [f"{trial.name}: {note}" if len(trials) > 1 else note for trial in trials for note in trial.notes]
+    said = [note.of(trial.name) if len(trials) > 1 else note for trial in trials for note in trial.notes]
+    said += notes
     models = dict.fromkeys(str(entry.get("model")) for entry in settings)
     presets = dict.fromkeys(name for entry in settings for name in entry.get("presets", {}))
     return render_page(
@@ -67,9 +68,9 @@ def render_comparison(
             *(f"preset {name}" for name in presets),
             f"dynakin {versions()['dynakin']}",
         ],
-        insights=[*_warned([*messages, *notes]), *_findings(tables)],
+        insights=[*_warned(said), *_findings(tables)],
         sections=_sections(trials, tables),
-        messages=[*messages, *notes],
+        messages=list(map(str, said)),
         configuration="\n".join(
             f"# {name}\n{tomli_w.dumps(plain(dict(entry)))}" for name, entry in zip(names, settings, strict=True)
         ),
@@ -133,9 +134,9 @@ def _sections(trials: Sequence[Trial], tables: Mapping[str, Sequence[Any]]) -> l
     return [section for section in found if not section.empty]
 
 
-def _warned(notes: Sequence[str]) -> list[Insight]:
+def _warned(said: Sequence[Message]) -> list[Insight]:
     """What makes all figures of a trial doubtful, before them."""
-    text = " ".join(sentence(note.replace(WARNING, "", 1)) for note in notes if WARNING in note)
+    text = " ".join(sentence(message.text) for message in warnings_of(said))
     if not text:
         return []
     return [Insight("warning", "Recordings", text, "Look at these trials with dynakin check or run first.")]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from dynakin.report.findings import fit, forces, recording, run, uncertainty
+from dynakin.report.findings import fit, forces, recording, run, said, uncertainty
 from dynakin.report.findings.finding import Insight, Metrics
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import listed, plural, sentence
@@ -33,13 +33,9 @@ def insights(estimate: Estimate, metrics: Metrics) -> list[Insight]:
 
 
 FINDINGS: tuple[tuple[Callable[[Estimate, Metrics], Insight | list[Insight] | None], tuple[str, ...]], ...] = (
-    (recording.guessed, ()),
-    (recording.unmarked, ()),
-    (forces.mass, ()),
-    (recording.warned, ()),
+    (said.warned, ()),
     (forces.left, ("feet",)),
     (run.failed, ()),
-    (fit.tracking, ()),
     (forces.moments, ("moments",)),
     (fit.markers, ("markers",)),
     (forces.wrench, ("wrench",)),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from dynakin.elements import element
+from dynakin.messages import Message
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.results.records import Event, Parameter, Timing, Tracking
@@ -92,7 +93,7 @@ class Estimate:
     ground: GroundFrame
     config: dict[str, Any]
     model_name: str
-    messages: list[str] = field(default_factory=list)
+    messages: list[Message] = field(default_factory=list)
     tracking: Tracking | None = None
     """How the person was followed (`results.measures.tracking`), as judged when it was estimated."""
 

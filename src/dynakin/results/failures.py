@@ -8,9 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from dynakin.errors import DynakinError
+from dynakin.messages import Message
 
-FAILED = "Failed:"
-"""How the message of a failed stage begins."""
 LOG = "failures.log"
 
 
@@ -23,9 +22,9 @@ class Failure:
     details: str
 
     @property
-    def message(self) -> str:
+    def message(self) -> Message:
         """One sentence for messages, console and page."""
-        return f"{FAILED} {self.stage}: {self.reason.rstrip('.')}."
+        return Message("results", "failure", f"{self.stage}: {self.reason.rstrip('.')}.")
 
 
 class Failures:
@@ -55,7 +54,7 @@ class Failures:
             if (name, reason) not in [(failure.stage, failure.reason) for failure in self.found]:  # tried again
                 self.found.append(Failure(name, reason, traceback.format_exc()))
 
-    def messages(self) -> list[str]:
+    def messages(self) -> list[Message]:
         """One sentence a failure."""
         return [failure.message for failure in self.found]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -21,37 +20,7 @@ NO_ESTIMATE = ("doubtful", "lost", "restarted")
 """Those of a frame whose numbers are no estimate."""
 NO_ESTIMATE_CODES = tuple(TRACKING.index(word) for word in NO_ESTIMATE)
 """Their numbers."""
-MISPLACED = "markers lie"
-"""How the warning begins of a model that does not fit the person."""
-NEVER_FLAT = "nothing shows the sole flat of "
-"""How the warning begins of feet whose ankles' zeros are not known."""
-LOW_PASSED = "the markers look low-passed at"
-"""How the warning begins of markers that a laboratory filtered before it gave them."""
-NOT_UPRIGHT = "nobody stands upright in"
-"""How the warning begins of a standing trial, or a stretch of standing, with bent legs."""
-OFF_PLACE = "by the movement the force does not act where the plates have it"
-"""How the warning begins of plates that press beside where the movement needs them to."""
-OFF_RATE = "movement and forces do not fit each other at "
-"""How the warning begins of a recording whose times are wrong."""
-NOT_SMOOTHED = "Not smoothed:"
-"""How the message begins of a run whose settings have no smoother."""
-IN_STEP = "they were brought into step."
-"""How the message ends of a run whose plates lagged behind the markers, or ran ahead of them."""
-WARNING = "Warning: "
-"""How the message begins that says that a trial may not be what it is taken for."""
-_MASS_DOUBTED = ("check the mass", "the mass is wrong")
-
 EventKind = Literal["missing", "gated", "at_bound", "reset", "note"]
-
-
-def warnings_of(messages: Iterable[str]) -> list[str]:
-    """The warnings among the messages of a calibration or an estimate."""
-    return [text for text in messages if text.startswith(WARNING)]
-
-
-def doubts_mass(message: str) -> bool:
-    """Whether it is that of a run in which the plates contradict the mass."""
-    return any(words in message for words in _MASS_DOUBTED)
 
 
 @dataclass(frozen=True)

@@ -165,7 +165,7 @@ def _write_truth(trial: SimulatedTrial, path: Path) -> None:
         "schema_version": SCHEMA_VERSION,
         "versions": {"dynakin": versions()["dynakin"], "numpy": versions()["numpy"]},
         "simulation": trial.settings,
-        "notes": list(trial.recording.notes),
+        "notes": list(map(str, trial.recording.notes)),
         "ground_origin_in_laboratory_m": truth.origin_L.tolist(),
         "parameters": truth.parameters,
         "segments": [

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
+from dynakin.messages import note
 from dynakin.recordings.recording import Recording
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.simulation.bodies.body import SimulatedBody
@@ -113,7 +114,7 @@ def simulate(
         markers=origin_L + seen.markers,
         plates=sensed,
         length_unit="m",
-        notes=(f"Simulated {body.name}, seed {seed}: {movement.description or movement.name}.",),
+        notes=(note("recording", f"Simulated {body.name}, seed {seed}: {movement.description or movement.name}."),),
         subject={"mass_kg": body.subject.mass_kg, "height_m": body.subject.height_m},
     )
     truth = Truth(

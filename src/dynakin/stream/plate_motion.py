@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from dynakin.filter.plate_motion import Needed, plates_delay, turned_axes
 from dynakin.filter.total_wrench import doubtful_mass
+from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.orientation import axis_vector
 from dynakin.stream.start import floor_plate
@@ -47,7 +48,7 @@ class LivePlateMotion:
         self._every_s = FIRST_S
         self.delay_s: float | None = None
         self.turned: str | None = None
-        self.mass: str | None = None
+        self.mass: Message | None = None
 
     def look(self, time_s: float, markers: Array, wrenches: Array, claimed: bool, whole: bool) -> bool:
         """The next frame; whether something was found.
@@ -96,8 +97,9 @@ class LivePlateMotion:
         if not foreign:
             self.mass = doubtful_mass(total, self._initial.weighed_kg, ratio, self._initial.unseen_kg)
         elif foreign > NEARLY_ALL:
-            self.mass = (
-                f"Warning: the plates carry {ratio * self._initial.weighed_kg:.1f} kg where the person weighs "
+            self.mass = warning(
+                "weight",
+                f"the plates carry {ratio * self._initial.weighed_kg:.1f} kg where the person weighs "
                 f"{self._initial.weighed_kg:.1f} kg, all the time: the mass or the unit of the forces is wrong, a "
-                "plate is missing, or something that no plate measures bears or pulls the person (a seat, a cable)."
+                "plate is missing, or something that no plate measures bears or pulls the person (a seat, a cable).",
             )

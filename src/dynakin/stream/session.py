@@ -14,8 +14,8 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.plate_motion import out_of_step_in_words
 from dynakin.filter.samples import Sample
 from dynakin.filter.tracker import Tracker, live_lag
+from dynakin.messages import Message, about, warning, warnings_of
 from dynakin.recordings.recording import Recording
-from dynakin.results.records import doubts_mass
 from dynakin.settings.defaults import DELAY_S
 from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import Fused, Fusion
@@ -189,10 +189,8 @@ class Live:
         self._subject = dict(streams.subject)
         if unknown_mass(self.estimator.model, self._subject, plates is not None):
             self._subject["mass_kg"] = _MASS_KG
-            self.say(
-                f"Warning: the mass is not given and there are no plates; {_MASS_KG:g} kg are taken, so that moments "
-                "are right in shape only."
-            )
+            text = f"the mass is not given and there are no plates; {_MASS_KG:g} kg are taken, so that moments are"
+            self.say(warning("mass", f"{text} right in shape only."))
         for sink in self.sinks:
             self._begin(sink)
 
@@ -324,9 +322,9 @@ class Live:
             self.say(f"{error.message}; trying again.")
             self._window.clear()
             return
-        for text in said:
-            self.say(text)
-        self._mass_doubted = any(map(doubts_mass, said))
+        for message in said:
+            self.say(message)
+        self._mass_doubted = bool(warnings_of(about(said, "weight")))
         self._begin_running("Ready: move.")
 
     def _begin_running(self, text: str) -> None:
@@ -397,7 +395,7 @@ class Live:
         if not asked.look(time_s, markers, wrenches, self._feet.claimed, whole):
             return
         if asked.turned is not None:
-            self.say(f"Warning: {asked.turned}. The plates are not used any more.")
+            self.say(warning("plates", f"{asked.turned}. The plates are not used any more."))
             self._use_plates = self._monitor.used = False
             self._plate_motion = None
         elif asked.delay_s is not None:
@@ -407,8 +405,9 @@ class Live:
             self._mass_doubted = True
             self.say(asked.mass)
 
-    def say(self, text: str) -> None:
+    def say(self, what: str | Message) -> None:
         """Say something to the user."""
+        text = str(what)
         phase = "running" if self._running else "waiting" if self._standing_since is None else "standing"
         status = Status(phase=phase) if self._monitor is None or not self._running else self._monitor.last
         self._say(text)

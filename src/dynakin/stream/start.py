@@ -12,6 +12,7 @@ from dynakin.errors import ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.total_wrench import doubtful_mass
 from dynakin.filter.tracker import Tracker
+from dynakin.messages import Message, about, note, notes_of, warning, warnings_of
 from dynakin.model.calibration.body import steady_load
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
@@ -25,7 +26,6 @@ from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, pl
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.results.naming import listed
-from dynakin.results.records import WARNING, warnings_of
 from dynakin.stream.fusion import Fused
 
 _NOW_S = 0.1  # the present posture, from a few frames
@@ -101,9 +101,9 @@ def stands(recording: Recording) -> bool:
     return window is not None and window.stop - window.start >= 0.8 * recording.n_frames
 
 
-def quietest(recording: Recording, weigh: bool = True) -> tuple[Recording, Recording, str]:
+def quietest(recording: Recording, weigh: bool = True) -> tuple[Recording, Recording, Message]:
     """What to begin with where nobody stands still for long: the present moment; what the model is measured on, half a
-    second or more of standing before it where there was any, else all of it; and words for it.
+    second or more of standing before it where there was any, else all of it; and what there is to say of it.
 
     Args:
         weigh: whether the mass is to come from it.
@@ -114,14 +114,17 @@ def quietest(recording: Recording, weigh: bool = True) -> tuple[Recording, Recor
         present, weighed = recording.window(end - _NOW_S, end), ""
         if weigh:
             present, weighed = _weighed(present, recording)
-        words = (
-            "Warning: the model is measured on a person who moves, whose joints and zeros of angles it shows less well"
-        )
+        text = "the model is measured on a person who moves, whose joints and zeros of angles it shows less well"
         whole = replace(recording, subject=present.subject)
-        return present, whole, f"{words}{weighed}. Stand still at the start, or give a standing trial (--static)."
+        text = f"{text}{weighed}. Stand still at the start, or give a standing trial (--static)."
+        return present, whole, warning("calibration", text)
     still = recording.time[window]
     quiet = recording.window(float(still[0]), float(still[-1]))
-    return recording.window(end - _NOW_S, end), quiet, f"{still[-1] - still[0]:.1f} s of standing are taken."
+    return (
+        recording.window(end - _NOW_S, end),
+        quiet,
+        note("calibration", f"{still[-1] - still[0]:.1f} s of standing are taken."),
+    )
 
 
 def _weighed(present: Recording, whole: Recording) -> tuple[Recording, str]:
@@ -147,7 +150,7 @@ def begin(
     known: Mapping[str, tuple[float, float]] | None = None,
     lag_s: float = 0.0,
     rate_hz: float | None = None,
-) -> tuple[Tracker, list[str], bool]:
+) -> tuple[Tracker, list[Message], bool]:
     """Calibrate the model on the standing person.
 
     Args:
@@ -167,11 +170,11 @@ def begin(
     said = warnings_of(initial.messages)
     if known:
         tracker = estimator.start(_continued(initial, known), lag_s=lag_s, rate_hz=rate_hz)
-        said.append(f"Lengths, marker places and masses go on from {len(known)} saved values.")
+        said.append(note("calibration", f"Lengths, marker places and masses go on from {len(known)} saved values."))
     usable = True
     if standing.plates:
         if _most_force(standing) < JUDGED_N:
-            return tracker, [*said, "Nobody stands on the plates yet; they are not checked."], usable
+            return tracker, [*said, note("plates", "Nobody stands on the plates yet; they are not checked.")], usable
         check = check_plates(
             static if static is not None and _most_force(static) >= JUDGED_N else standing,
             initial.ground,
@@ -181,14 +184,13 @@ def begin(
         if check.refusal:
             raise RecordingError(f"plates: {check.refusal}")
         weighed = check.mass_kg_from_plates is not None
-        said += [text for text in check.messages if text.startswith(WARNING) or (weighed and "kg" in text)]
+        said += warnings_of(check.messages)
+        said += notes_of(about(check.messages, "weight")) if weighed else []
         mass, tolerance = check.mass_kg_from_plates, estimator.noise.plate_load_tolerance
         if mass is not None and tolerance is not None and abs(mass - initial.weighed_kg) > tolerance * mass:
             usable = False
-            said.append(
-                f"Warning: the plates carry {mass:.1f} kg where the person weighs {initial.weighed_kg:.1f} kg; the "
-                "plates are not used."
-            )
+            text = f"the plates carry {mass:.1f} kg where the person weighs {initial.weighed_kg:.1f} kg"
+            said.append(warning("weight", f"{text}; the plates are not used."))
         elif mass is not None and initial.feet:
             ratio = mass / initial.weighed_kg
             doubt = doubtful_mass(np.zeros((0, 6)), initial.weighed_kg, ratio, initial.unseen_kg)
@@ -217,4 +219,4 @@ def _continued(initial: CalibratedModel, known: Mapping[str, tuple[float, float]
     if not beyond:
         return replace(initial, x0=x0, sd0=sd0)
     text = f"Of the saved parameters {listed(beyond)} lie beyond their bounds as measured here: measured anew."
-    return replace(initial, x0=x0, sd0=sd0, messages=(*initial.messages, text))
+    return replace(initial, x0=x0, sd0=sd0, messages=(*initial.messages, note("calibration", text)))

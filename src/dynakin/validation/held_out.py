@@ -13,6 +13,7 @@ from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.total_wrench import known_ground
 from dynakin.filter.tracker import Tracker, known_lag
+from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject
@@ -81,7 +82,7 @@ class Blind:
     recording: Recording
     start: CalibratedModel
     wrenches: dict[str, Array]
-    notes: tuple[str, ...]
+    notes: tuple[Message, ...]
     plates: Mapping[str, str] | None = None
     tolerance: float | None = None
 
@@ -159,12 +160,12 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
         if identified.subject is not None:
             label = BATCH if identified.subject.use == "bodies" else "table"
             found[f"EKF ({preset}), {CHOSEN}"] = found[f"EKF ({preset}), {label}"]
-    notes: list[str] = []
+    notes: list[Message] = []
     try:
         planar = setup.definition.planar
         found |= _referred(identified, recording, start) if planar else _inverse(setup, start, recording)
     except ModelError as error:
-        notes.append(f"AT, the classical method and least squares are left out: {error.message}")
+        notes.append(note("method", f"AT, the classical method and least squares are left out: {error.message}"))
     known = identified.wrench[np.isfinite(identified.wrench).all(axis=1)]
     for label, guess in (("last", known[-1]), ("mean", known.mean(axis=0))):
         found[f"persistence: {label}"] = np.repeat(guess[None], recording.n_frames, axis=0)

@@ -15,6 +15,7 @@ from dynakin.errors import DynakinError, LostError, ModelError
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
 from dynakin.filter.zero import asked_angles
+from dynakin.messages import Message, about, note, notes_of, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.progress import Progress, stage
@@ -27,7 +28,6 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
 from dynakin.results.measures.tracking import why_lost
-from dynakin.results.records import warnings_of
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.lag import in_words
 from dynakin.units import COMPONENTS
@@ -100,7 +100,7 @@ class Trial:
     repetitions: Found
     mass_kg: float
     methods: tuple[Method, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Message, ...]
     estimates: dict[str, Estimate]
     lost: dict[str, str] = field(default_factory=dict)
 
@@ -143,15 +143,15 @@ def compare_trial(
     initial = list(trackers.values())[-1].calibrated
     with stage(f"{recording.name}: the reference methods"):
         trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, inverse=True)
-    mass = [text for text in initial.messages if text.startswith("Mass ")]
+    mass = notes_of(about(initial.messages, "mass"))
     said = warnings_of(initial.messages)
-    said += [text for estimate in estimates.values() for text in warnings_of(estimate.messages)]
+    said += [message for estimate in estimates.values() for message in warnings_of(estimate.messages)]
     return with_lost(replace(trial, notes=tuple(dict.fromkeys((*said, *mass, *trial.notes)))), lost)
 
 
 def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:
     """The trial with the filters that lost the person, which are left out, in its notes."""
-    notes = [f"Warning: EKF ({preset}) is left out: {reason}." for preset, reason in lost.items()]
+    notes = [warning("lost", f"EKF ({preset}) is left out: {reason}.") for preset, reason in lost.items()]
     return replace(trial, notes=(*trial.notes, *notes), lost=dict(lost))
 
 
@@ -233,7 +233,7 @@ def trial_of(
     except DynakinError as error:
         if not (tolerant or isinstance(error, ModelError)):
             raise
-        notes.append(f"AT and the classical method are left out: {error.message}")
+        notes.append(note("method", f"AT and the classical method are left out: {error.message}"))
     data = first.data
     return Trial(
         name=first.recording.name,
@@ -253,11 +253,11 @@ def trial_of(
     )
 
 
-def how_estimated(estimates: Mapping[str, Estimate]) -> list[str]:
+def how_estimated(estimates: Mapping[str, Estimate]) -> list[Message]:
     """Which filters are smoothed and which are as live, where they are shown together and differ."""
     if len({estimate.lag_s for estimate in estimates.values()}) < 2:
         return []
-    return [f"EKF ({preset}): each frame {in_words(e.lag_s)}." for preset, e in estimates.items()]
+    return [note("method", f"EKF ({preset}): each frame {in_words(e.lag_s)}.") for preset, e in estimates.items()]
 
 
 def _method(name: str, kind: str, data: xr.Dataset) -> Method:
@@ -273,18 +273,18 @@ def _method(name: str, kind: str, data: xr.Dataset) -> Method:
 
 
 def _in_plane(
-    first: Estimate, initial: CalibratedModel, definition: Definition, cutoff_hz: float, notes: list[str]
+    first: Estimate, initial: CalibratedModel, definition: Definition, cutoff_hz: float, notes: list[Message]
 ) -> list[Method]:
     options: tuple[tuple[str, Lengths], ...] = ((AT, "constant"), (CLASSICAL, "frame"))
     found = []
     for kind, lengths in options:
         reference = reference_methods(first.recording, initial, definition, cutoff_hz, lengths=lengths)
         found.append(_referred(kind, reference, initial))
-        notes += [f"{kind}: {note}" for note in reference.notes]
+        notes += [note("method", f"{kind}: {text}") for text in reference.notes]
     return found
 
 
-def _inverse(first: Estimate, initial: CalibratedModel, cutoff_hz: float, notes: list[str]) -> list[Method]:
+def _inverse(first: Estimate, initial: CalibratedModel, cutoff_hz: float, notes: list[Message]) -> list[Method]:
     """Inverse kinematics and dynamics at the cut-off that was asked for, and at the other usual one.
 
     Args:
@@ -297,7 +297,7 @@ def _inverse(first: Estimate, initial: CalibratedModel, cutoff_hz: float, notes:
         name = inverse_name(cutoff)
         judged, said = with_plates(motion, data)
         found.append(_method(name, INVERSE, facing(replace(first, data=judged)).data))
-        notes += [f"{name}: {note}" for note in said]
+        notes += [note("method", f"{name}: {text}") for text in said]
     return found
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms
+from dynakin.messages import note
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.adaptation import constant_groups
 from dynakin.results.measures.sources import legs_of
@@ -76,10 +77,10 @@ def against_truth(trials: Sequence[Trial]) -> tuple[list[Trial], list[TruthRow]]
                 continue  # another recording's
             joints, known = _leg_joints(trial), {str(name) for name in truth["coordinate"].values}
             if lacking := set(joints) - known:
-                note = (
+                text = (
                     f"The truth in {path} is left out: it is of another model, which has no {listed(sorted(lacking))}."
                 )
-                noted[-1] = replace(trial, notes=(*trial.notes, note))
+                noted[-1] = replace(trial, notes=(*trial.notes, note("method", text)))
                 continue
             turning = known & {n for n, turns in zip(trial.coordinate_names, trial.rotation, strict=True) if turns}
             paths = truth["coordinates"].transpose("time", "coordinate")

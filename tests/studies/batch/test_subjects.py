@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 from dynakin.cli.app import main
-from dynakin.cli.batch import to_say
 from dynakin.model.identified import read_identified
 from dynakin.simulation.trial import simulate
 from dynakin.studies.batch.dataset import Dataset, read_dataset
@@ -76,11 +75,6 @@ def test_a_copy_is_no_second_trial(dataset: Dataset, tmp_path: Path) -> None:
     one = dataset.sessions[0]
     said = identify_on_trials(IdentifyOptions(tmp_path), [one, replace(one, trial="copy")])
     assert said["use"] == "table" and "the markers are the same" in said["said"][-1]
-
-
-def test_of_a_subject_warnings_and_trials_that_are_left_out_are_printed() -> None:
-    said = ["Left out: S1/a: another person.", "Table: FX 3 N.", "Warning: a doubt.", "The table is kept."]
-    assert to_say(said) == [said[0], *said[2:]] and to_say(said[-1:]) == said[-1:]
 
 
 @pytest.mark.parametrize("option", ["--identify", "--no-identify"])

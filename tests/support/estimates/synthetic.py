@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from dynakin.messages import note
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.estimate import AXES, Estimate
@@ -124,8 +125,8 @@ def make_estimate(duration_s: float = 12.0, *, seed: int = 0, unit: str = "mm", 
         config=dict(_CONFIG),
         model_name="sagittal7",
         messages=[
-            "Elbow: the recording has no wrist marker, so the forearm is locked to the upper arm.",
-            "Mass 57.30 kg from the plates while standing still from 0 s to 1.2 s.",
+            note("calibration", "Elbow: the recording has no wrist marker, so the forearm is locked to the upper arm."),
+            note("mass", "Mass 57.30 kg from the plates while standing still from 0 s to 1.2 s."),
         ],
     )
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynakin.messages import note
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
@@ -116,11 +117,11 @@ def make_walker(withheld: tuple[int, ...] = (), *, code: int = DERIVED) -> Estim
         foot_segment=("foot", ["foot_r", "foot_l"]),
         element=names,
     )
-    messages = ["The left foot stands off the plates from 1.70 to 2.30 s: what it carries is estimated there."]
+    reason = "The left foot stands off the plates from 1.70 to 2.30 s: what it carries is estimated there."
     return replace(
         made,
         data=data,
         model_name="fullbody",
-        config=made.config | {"mass_kg": MASS_KG, "ground": {"reasons": messages if withheld else []}},
-        messages=[*made.messages, *(messages if withheld else [])],
+        config=made.config | {"mass_kg": MASS_KG, "ground": {"reasons": [reason] if withheld else []}},
+        messages=[*made.messages, *([note("plates", reason)] if withheld else [])],
     )

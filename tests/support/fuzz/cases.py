@@ -134,7 +134,7 @@ def _check_result(found: Any, what: str) -> None:
                 raise Unclean(f"an infinite number in analog channel {channel.name}")
         if not np.isfinite([*(event.time_s for event in found.events), *found.subject.values()]).all():
             raise Unclean("an infinite number in events or measures of the person")
-        if not "".join(found.notes).isprintable():
+        if not "".join(map(str, found.notes)).isprintable():
             raise Unclean("notes that cannot be printed")
         found.window(float(found.time[0]), float(found.time[-1]))
     else:

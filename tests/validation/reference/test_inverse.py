@@ -114,7 +114,7 @@ def test_beside_the_filter_it_has_the_same_labels_and_says_what_it_leaves(
     trial: Trial = compare_trial(simulated.recording, setup)
     assert [method.name for method in trial.methods] == ["EKF (default)", "IK + ID (6 Hz)", "IK + ID (12 Hz)"]
     assert trial.methods[1].kind == INVERSE and trial.methods[1].name == inverse_name(6.0)
-    assert any("What it leaves at the pelvis" in note for note in trial.notes)
+    assert any("What it leaves at the pelvis" in note for note in map(str, trial.notes))
     filtered, classical = trial.methods[0], trial.methods[1]
     assert trial.reference("AT") is trial.reference("classical") is classical
     for name in ("coordinates", "moments", "markers", "wrench"):

@@ -10,6 +10,7 @@ import scipy
 
 from dynakin.arrays import rms, runs
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.completion import Proportions
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
@@ -52,7 +53,7 @@ def find_mass(
     foot_markers: Mapping[str, Sequence[str]],
     pelvis: Sequence[str] = (),
     height_m: float | None = None,
-) -> tuple[float, str]:
+) -> tuple[float, list[Message]]:
     """Mass (kg) and where it comes from: given, from the plates while standing still, from the file, or, with a
     warning, from the plates' mean over a movement that is long and steady enough, or from their impulse while they
     bear all of the person.
@@ -66,7 +67,7 @@ def find_mass(
         ModelError: none of these; the message says why the plates do not show it.
     """
     if subject.mass_kg is not None:
-        return subject.mass_kg, f"Mass {subject.mass_kg:.2f} kg: given."
+        return subject.mass_kg, [note("mass", f"Mass {subject.mass_kg:.2f} kg: given.")]
     reasons, means = [], []
     for recording, ground in trials:
         if not recording.plates:
@@ -89,22 +90,29 @@ def find_mass(
                 means.append((mean, f"{text}person, and the speed that the pelvis gains"))
         else:
             mass = float(check.mass_kg_from_plates)
-            return mass, f"Mass {mass:.2f} kg: from the plates of {recording.name} while standing still."
+            return mass, [
+                note("mass", f"Mass {mass:.2f} kg: from the plates of {recording.name} while standing still.")
+            ]
     for recording, _ in trials:
         mass_kg = recording.subject.get("mass_kg")
         if mass_kg:
-            return mass_kg, f"Mass {mass_kg:.2f} kg: from the file {recording.name}."
+            return mass_kg, [note("mass", f"Mass {mass_kg:.2f} kg: from the file {recording.name}.")]
     for mass, name in means:
-        return mass, (
-            f"Warning: mass {mass:.2f} kg from {name}; wrong where anything but the plates bears the person. Give the "
-            "mass if it is known."
+        doubt = (
+            f"mass {mass:.2f} kg from {name}; wrong where anything but the plates bears the person. Give the mass "
+            "if it is known."
         )
+        return mass, [
+            note("mass", f"Mass {mass:.2f} kg: from the plates while the person moves."),
+            warning("mass", doubt),
+        ]
     if height_m is not None and not any(recording.plates for recording, _ in trials):
         mass = MEAN_BODY_MASS_INDEX * height_m**2
-        return mass, (
-            f"Warning: mass {mass:.1f} kg assumed, of a mean adult of {height_m:.2f} m: it is not given, and there are "
-            "no plates. Forces and moments grow with it. Give the mass if it is known."
+        doubt = (
+            f"mass {mass:.1f} kg assumed, of a mean adult of {height_m:.2f} m: it is not given, and there are no "
+            "plates. Forces and moments grow with it. Give the mass if it is known."
         )
+        return mass, [note("mass", f"Mass {mass:.1f} kg: assumed."), warning("mass", doubt)]
     raise ModelError(
         f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject (--mass)"
     )
@@ -184,7 +192,7 @@ def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) ->
 
 def find_height(
     subject: Subject, recordings: list[Recording], trial: Trial, finder: LandmarkFinder | None = None
-) -> tuple[float | None, str]:
+) -> tuple[float | None, list[Message]]:
     """Height (m) and where it comes from; None with the reason where nothing gives it.
 
     Args:
@@ -197,11 +205,11 @@ def find_height(
     another level than the foot that stands (a box, stairs), the lowest one of the same frame takes its place.
     """
     if subject.height_m is not None:
-        return subject.height_m, f"Height {subject.height_m:.2f} m: given."
+        return subject.height_m, [note("height", f"Height {subject.height_m:.2f} m: given.")]
     for recording in recordings:
         height_m = recording.subject.get("height_m")
         if height_m:
-            return height_m, f"Height {height_m:.2f} m: from the file {recording.name}."
+            return height_m, [note("height", f"Height {height_m:.2f} m: from the file {recording.name}.")]
     marker_set = trial.match.marker_set
     tops = [
         path
@@ -212,17 +220,20 @@ def find_height(
     if not len(over) or marker_set.height_fraction is None:
         if finder is not None:
             return _by_proportions(trial, finder)
-        return None, f"height_m is not given and {marker_set.height_marker or 'no marker'} does not show it."
+        return None, [
+            note("height", f"height_m is not given and {marker_set.height_marker or 'no marker'} does not show it.")
+        ]
     height, lowest = _over_lowest(trial, tops, over)
     height /= marker_set.height_fraction
-    return height, (
+    text = (
         f"Height {height:.2f} m: not given, estimated from {marker_set.height_marker} (where it is highest) "
         f"over the {lowest}, divided by {marker_set.height_fraction:g} "
         f"({marker_set.height_source})."
     )
+    return height, [note("height", text)]
 
 
-def _by_proportions(trial: Trial, finder: LandmarkFinder) -> tuple[float, str]:
+def _by_proportions(trial: Trial, finder: LandmarkFinder) -> tuple[float, list[Message]]:
     """Height (m) from the highest landmark that needs no height itself, over a foot that stands."""
     feet = [name for names in trial.match.foot_markers.values() for name in names]
     for name in _HEIGHT_BY if feet else ():
@@ -234,14 +245,16 @@ def _by_proportions(trial: Trial, finder: LandmarkFinder) -> tuple[float, str]:
         reach, lowest = _over_lowest(trial, tops, over)
         template = Proportions.load().landmarks
         fraction = float(template[f"{name}_r"][1] - template["heel_r"][1])
-        return reach / fraction, (
+        text = (
             f"Height {reach / fraction:.2f} m: not given, estimated from {name} (where it is highest) over the "
             f"{lowest}, divided by {fraction:g} (proportions of an adult)."
         )
-    return MEAN_HEIGHT_M, (
-        f"Warning: height {MEAN_HEIGHT_M:.2f} m assumed, of a mean adult: it is not given and no markers show it. What "
-        "no markers measure is of this size. Give the height if it is known."
+        return reach / fraction, [note("height", text)]
+    doubt = (
+        f"height {MEAN_HEIGHT_M:.2f} m assumed, of a mean adult: it is not given and no markers show it. What no "
+        "markers measure is of this size. Give the height if it is known."
     )
+    return MEAN_HEIGHT_M, [note("height", f"Height {MEAN_HEIGHT_M:.2f} m: assumed."), warning("height", doubt)]
 
 
 def _over_lowest(trial: Trial, tops: list[Array], over: Array) -> tuple[float, str]:

@@ -11,6 +11,7 @@ from scipy.linalg import block_diag
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note
 from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.plan import ModelPlan
 from dynakin.model.spec import in_layout
@@ -105,7 +106,7 @@ class CalibratedModel(StartingState):
     mass_kg: float
     height_m: float | None
     parts: dict[str, list[PlacedPart]]
-    messages: tuple[str, ...]
+    messages: tuple[Message, ...]
     plan: ModelPlan | None
     feet: dict[str, str] = field(default_factory=dict)
     foot_markers: dict[str, list[str]] = field(default_factory=dict)
@@ -161,7 +162,7 @@ def starting_state(
     prior: Mapping[str, float],
     table: Mapping[str, float],
     speeds: Mapping[str, float],
-) -> tuple[StartingState, list[str]]:
+) -> tuple[StartingState, list[Message]]:
     """The state that a specification starts with, within its bounds, and a sentence on each element that is put there.
 
     Args:
@@ -176,7 +177,11 @@ def starting_state(
     lower = in_layout(names, {name: pair[0] for name, pair in bounds.items()}, -np.inf)
     upper = in_layout(names, {name: pair[1] for name, pair in bounds.items()}, np.inf)
     said = [
-        f"Start of {names[k]} ({x0[k]:.3f}) lies beyond its bounds {lower[k]:.3f} to {upper[k]:.3f}: put on the bound."
+        note(
+            "details",
+            f"Start of {names[k]} ({x0[k]:.3f}) lies beyond its bounds {lower[k]:.3f} to {upper[k]:.3f}: put on the "
+            "bound.",
+        )
         for k in np.flatnonzero((x0 < lower) | (x0 > upper))
     ]
     within = np.clip(x0, lower, upper)

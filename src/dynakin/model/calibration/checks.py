@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.inertia import RigidBody
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
-from dynakin.results.records import NOT_UPRIGHT
 
 Array = npt.NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def refuse_moving_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder)
                 )
 
 
-def check_standing(landmarks: Mapping[str, Array], name: str, *, given: bool) -> list[str]:
+def check_standing(landmarks: Mapping[str, Array], name: str, *, given: bool) -> list[Message]:
     """A warning where somebody who holds still does so with bent legs: a squat, or sitting.
 
     Args:
@@ -73,12 +73,15 @@ def check_standing(landmarks: Mapping[str, Array], name: str, *, given: bool) ->
     if not bent[worst] > BENT_DEG:
         return []
     of = "against the vertical" if worst.endswith("thigh") else "bent"
-    said = f"{NOT_UPRIGHT} {name}: the {worst} is {bent[worst]:.0f} deg {of}"
+    said = f"nobody stands upright in {name}: the {worst} is {bent[worst]:.0f} deg {of}"
     if given and all(bent[knee] > SITS_DEG for knee in ("right knee", "left knee")):
         raise ModelError(f"{said}, expected a standing trial of the person upright with straight knees (--static)")
     return [
-        f"Warning: {said}, and places of markers measured there are off where the legs are straight. Give a standing "
-        "trial of the person upright with straight knees (--static)."
+        warning(
+            "standing",
+            f"{said}, and places of markers measured there are off where the legs are straight. Give a standing "
+            "trial of the person upright with straight knees (--static).",
+        )
     ]
 
 
@@ -102,7 +105,7 @@ def check_masses(
     parts: dict[str, list[PlacedPart]],
     mass_kg: float,
     height_m: float | None,
-    messages: list[str],
+    messages: list[Message],
 ) -> None:
     """Say which lengths of the table came from the height, and whether the segments hold the whole body.
 
@@ -117,23 +120,33 @@ def check_masses(
             )
         for part in by_height:
             text = f"Length of {part.name} for the inertia table: {1000 * part.length:.0f} mm, from the height."
-            if text not in messages:  # right and left say the same
-                messages.append(text)
+            said = note("details", text)
+            if said not in messages:  # right and left say the same
+                messages.append(said)
     total = sum(body.mass for body in inertia.values())
     if abs(total - mass_kg) > 1e-9 * mass_kg:
-        messages.append(f"The segments of model {model.name} hold {total:.2f} kg of the body's {mass_kg:.2f} kg.")
+        messages.append(
+            note(
+                "calibration", f"The segments of model {model.name} hold {total:.2f} kg of the body's {mass_kg:.2f} kg."
+            )
+        )
 
 
-def report(model: ModelFile, plan: ModelPlan, mass_kg: float, messages: list[str]) -> None:
+def report(model: ModelFile, plan: ModelPlan, mass_kg: float, messages: list[Message]) -> None:
     """Say the lengths and masses that were found."""
     known = plan.geometry.lengths.items()
     lengths = ", ".join(f"{name} {1000 * value:.0f}" for name, value in known if value)  # corrections start at 0
     masses = ", ".join(f"{name} {body.mass:.2f}" for name, body in plan.inertia.items())
-    messages.append(f"Lengths (mm): {lengths}.")
-    messages.append(f"Masses (kg, {'both sides; ' if model.planar else ''}{mass_kg:.2f} in all): {masses}.")
+    messages.append(note("details", f"Lengths (mm): {lengths}."))
+    messages.append(
+        note("details", f"Masses (kg, {'both sides; ' if model.planar else ''}{mass_kg:.2f} in all): {masses}.")
+    )
     if model.planar:
         messages.append(
-            "Markers are projected on the sagittal plane (forward and up); sideways motion is not modelled."
+            note(
+                "calibration",
+                "Markers are projected on the sagittal plane (forward and up); sideways motion is not modelled.",
+            )
         )
 
 

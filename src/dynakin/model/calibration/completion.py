@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note
 from dynakin.model.calibration.landmarks import BENT, Positions
 from dynakin.model.calibration.posture import frame_landmarks
 from dynakin.model.markers.anatomy import standing_at
@@ -80,7 +81,7 @@ class Completed:
 
     landmarks: dict[str, Array]
     added: dict[str, str] = field(default_factory=dict)  # landmark -> segment
-    messages: list[str] = field(default_factory=list)
+    messages: list[Message] = field(default_factory=list)
 
 
 def wanted_landmarks(
@@ -194,11 +195,10 @@ def completed(
         )
     _middles(found.landmarks, set(template.landmarks))
     if found.added:
-        found.messages.append(
+        text = (
             f"From the proportions of an adult of {height_m:.2f} m, or the other side, because no markers give them: "
-            + ", ".join(sorted(found.added))
-            + "."
         )
+        found.messages.append(note("calibration", f"{text}{', '.join(sorted(found.added))}."))
     return found
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, ModelError
+from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.contacts import SEAT, DeclaredContact
 from dynakin.settings.strict import nearest
@@ -53,7 +54,12 @@ def with_loads(initial: CalibratedModel, loads: Sequence[CarriedLoad]) -> Calibr
     carried = sum(load.mass_kg for load in loads)
     said = ", ".join(f"{load.name} {load.mass_kg:g} kg on the {load.segment}" for load in loads)
     message = f"Known loads: {said}. They count as the person's weight on the plates and move with their segments."
-    return replace(initial, spec=spec, carried_kg=initial.carried_kg + carried, messages=(*initial.messages, message))
+    return replace(
+        initial,
+        spec=spec,
+        carried_kg=initial.carried_kg + carried,
+        messages=(*initial.messages, note("calibration", message)),
+    )
 
 
 _SIDES = {"right": "r", "left": "l"}

@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from dynakin.messages import Message, warning
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.sites import Candidate
@@ -13,7 +14,6 @@ from dynakin.model.markers.anatomy import standing_at
 from dynakin.model.schema import ModelFile
 from dynakin.recordings.feet.contact import foot_contacts
 from dynakin.results.naming import listed
-from dynakin.results.records import NEVER_FLAT
 
 _USUAL_OFF_DEG, _UNKNOWN_OFF_DEG = 5, 15
 """Of the zero of an ankle's angle where heel and toes count as an adult's on a flat foot, and where there is no such
@@ -50,7 +50,7 @@ def usual_slopes(finder: LandmarkFinder) -> dict[str, float]:
 
 def never_flat(
     model: ModelFile, flat: Collection[str], usual: Collection[str], chosen: Sequence[Candidate]
-) -> list[str]:
+) -> list[Message]:
     """Sentences on marked feet of a person who does not stand still, but for those of ``flat`` sides, whose heel and
     toes show how they stand: the line between these is the usual one's, or there is none and the foot counts as flat in
     a frame in which it may not be."""
@@ -63,7 +63,11 @@ def never_flat(
     ):
         if feet:
             found.append(
-                f"Warning: {NEVER_FLAT}{listed(feet)} (heel and toes together on the ground, or standing still): the "
-                f"zero of the ankle's angle may be {off_deg} deg off. Give a standing trial (--static)."
+                warning(
+                    "ankles",
+                    f"nothing shows the sole flat of {listed(feet)} (heel and toes together on the ground, or "
+                    "standing still): the "
+                    f"zero of the ankle's angle may be {off_deg} deg off. Give a standing trial (--static).",
+                )
             )
     return found

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.joint_motion import (
     BLOCKS,
@@ -58,7 +59,7 @@ def functional_landmarks(
     finder: LandmarkFinder,
     source: Trial,
     frames: npt.NDArray[np.intp],
-) -> tuple[dict[str, Array], list[str]]:
+) -> tuple[dict[str, Array], list[Message]]:
     """Landmarks of models in space, those of the joints replaced that functional trials show, and sentences on it.
 
     Args:
@@ -69,7 +70,7 @@ def functional_landmarks(
         ModelError: another person's trial, markers of a segment or of the joint itself are lacking, the joint moves too
             little, or not as one joint does.
     """
-    found, messages = dict(landmarks), []
+    found, messages = dict(landmarks), list[Message]()
     for joint in sorted(trials):  # hips first: the thigh's frame is spoken of by its new centre
         name = joint.split("_")[0]
         where = f"functional trial {trials[joint].path or trials[joint].name} for {joint}"
@@ -79,8 +80,11 @@ def functional_landmarks(
         motion, without = joint_motion(joint, trials[joint], found, source, frames, where)
         if without:
             messages.append(
-                f"{trials[joint].name}: {', '.join(without)} left out for {joint}: moved against the others of the "
-                "segment since standing (a label swapped in a part of the trial, perhaps)."
+                note(
+                    "calibration",
+                    f"{trials[joint].name}: {', '.join(without)} left out for {joint}: moved against the others of the "
+                    "segment since standing (a label swapped in a part of the trial, perhaps).",
+                )
             )
         turned = motion.range_deg
         if name == "hip":
@@ -89,13 +93,20 @@ def functional_landmarks(
                     f"{where}: the thigh turns through {turned[0]:.0f} by {turned[1]:.0f} deg, expected {_HIP_DEG:g} "
                     "deg or more about two axes (swing the leg forward, sideways and between, and around)"
                 )
-            messages.append(_put_centre(joint_centre(motion), found, joint, turned, where, trials[joint].name))
+            messages.append(
+                note("calibration", _put_centre(joint_centre(motion), found, joint, turned, where, trials[joint].name))
+            )
         else:
             if turned[0] < KNEE_DEG:
                 raise ModelError(
                     f"{where}: the knee turns through {turned[0]:.0f} deg, expected {KNEE_DEG:g} deg or more"
                 )
-            messages.append(_put_axis(joint_axis(motion), found, finder, joint, turned, where, trials[joint].name))
+            messages.append(
+                note(
+                    "calibration",
+                    _put_axis(joint_axis(motion), found, finder, joint, turned, where, trials[joint].name),
+                )
+            )
         put_middles(found, *(("hip",) if name == "hip" else ("knee", "knee_lateral")))
     return found, messages
 

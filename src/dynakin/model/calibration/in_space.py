@@ -10,6 +10,7 @@ import numpy.typing as npt
 from dynakin.arrays import rms
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.observed import hold_unseen
 from dynakin.model.calibration.pose_start import PoseFit, near, start_posture
@@ -38,7 +39,7 @@ class Started:
 
     plan: ModelPlan
     speeds: dict[str, float]
-    messages: list[str]
+    messages: list[Message]
     held: dict[str, str]  # coordinates that are locked because the markers do not show them, and why
 
 
@@ -53,7 +54,7 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
         ModelError: no frame shows enough markers, or they do not fit the model.
     """
     limits = {c.name: c.limits for c in plan.model.coordinates if np.isfinite(c.limits).any()}
-    messages: list[str] = []
+    messages: list[Message] = []
     paths = _paths(trial, plan.sites)
     model = _core.Model(to_core(plan))
     extra: list[Site] = []
@@ -61,7 +62,11 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
         path = trial.ground.points_to_ground(trial.recording.marker(candidate.recorded))
         both = np.flatnonzero(np.isfinite(path).all(axis=1) & _enough(paths))
         if not len(both):
-            messages.append(f"Marker {candidate.recorded} left out: never seen together with most of the others.")
+            messages.append(
+                note(
+                    "calibration", f"Marker {candidate.recorded} left out: never seen together with most of the others."
+                )
+            )
             continue
         k = model.segment_names.index(candidate.segment)
         found = []
@@ -70,7 +75,12 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
             R, p = _core.segment_poses(model, fit.x)
             found.append(R[k].T @ (path[frame] - p[k]))
         extra.append(site_of(candidate, np.median(found, axis=0), in_space=True))
-        messages.append(f"Marker {candidate.recorded} is not seen in the calibration frames: placed from later ones.")
+        messages.append(
+            note(
+                "calibration",
+                f"Marker {candidate.recorded} is not seen in the calibration frames: placed from later ones.",
+            )
+        )
     if extra:
         plan = replace(plan, sites=(*plan.sites, *extra))
         model, paths = _core.Model(to_core(plan)), _paths(trial, plan.sites)
@@ -80,7 +90,7 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
     plan, held = hold_unseen(plan, _postures(model, paths, limits))
     if held:
         names = ", ".join(held)
-        messages.append(f"Held where they stand, because the markers do not show them: {names}.")
+        messages.append(note("calibration", f"Held where they stand, because the markers do not show them: {names}."))
         model = _core.Model(to_core(plan))
     if not still:
         plan, how = _averaged(plan, paths, limits)
@@ -88,9 +98,19 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
         messages += how
     first = int(usable[0])
     if first > 0:
-        messages.append(f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.")
+        messages.append(
+            note(
+                "details",
+                f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.",
+            )
+        )
     fit = start_posture(model, paths[first], limits=limits, where=trial.match.where)
-    messages.append(f"Start: all coordinates fitted to the markers, {1000.0 * fit.rms_m:.1f} mm (root mean square).")
+    messages.append(
+        note(
+            "details",
+            f"Start: all coordinates fitted to the markers, {1000.0 * fit.rms_m:.1f} mm (root mean square).",
+        )
+    )
     speeds = _speeds(model, paths, trial, first, fit, limits)
     return Started(replace(plan, start=fit.coordinates), speeds, messages, held)
 
@@ -105,7 +125,7 @@ def _postures(model: _core.Model, paths: Array, limits: dict[str, Interval]) -> 
     return found
 
 
-def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tuple[ModelPlan, list[str]]:
+def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tuple[ModelPlan, list[Message]]:
     """Marker places as their mean over frames of the trial, postures fitted and places averaged by turns."""
     frames = _spread(np.flatnonzero(_enough(paths)), _AVERAGED)
     fit_mm: list[float] = []
@@ -136,10 +156,11 @@ def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tup
                 for site, mean in zip(plan.sites, means, strict=True)
             ),
         )
-    return plan, [
+    text = (
         f"Marker places: averaged over {len(frames)} frames of the trial, in {_TURNS} turns (rigid fit "
         f"{fit_mm[0]:.1f} mm before, {fit_mm[-1]:.1f} mm in the last turn)."
-    ]
+    )
+    return plan, [note("details", text)]
 
 
 def _speeds(

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dynakin.errors import ModelError
+from dynakin.messages import Message, warning
 from dynakin.model.calibration.completion import free
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
@@ -66,7 +67,7 @@ def table_markers(model: ModelFile, table: BodyTable, finder: LandmarkFinder) ->
 
 def seen_together(
     model: ModelFile, finder: LandmarkFinder, match: MarkerMatch, source: Trial
-) -> tuple[LandmarkFinder, list[str]]:
+) -> tuple[LandmarkFinder, list[Message]]:
     """The finder without markers that are never seen with the others of the landmarks, whose recipes fall back on what
     is left, and a sentence on them. They stay markers of their segments.
 
@@ -92,6 +93,9 @@ def seen_together(
     if not apart:
         return finder, []
     return finder, [
-        f"Warning: no frame of {source.recording.name} shows all markers of the joint centres: measured without "
-        f"{', '.join(apart.values())}, which {'is' if len(apart) == 1 else 'are'} not seen when the others are."
+        warning(
+            "calibration",
+            f"no frame of {source.recording.name} shows all markers of the joint centres: measured without "
+            f"{', '.join(apart.values())}, which {'is' if len(apart) == 1 else 'are'} not seen when the others are.",
+        )
     ]

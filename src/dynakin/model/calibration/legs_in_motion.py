@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note
 from dynakin.model.calibration.completion import Proportions, laid
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.functional import (
@@ -54,7 +55,7 @@ class Legs:
 
     landmarks: dict[str, Array]
     joints: list[str] = field(default_factory=list)
-    messages: list[str] = field(default_factory=list)
+    messages: list[Message] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)
 
 
@@ -82,8 +83,11 @@ def legs_in_motion(
             places = {} if ankle is None else {f"ankle_{letter}": ankle}
         else:
             found.messages.append(
-                f"{names.capitalize()}: where the segments turn against each other in the movement, with a leg that is "
-                f"straight seen from the front.{said}"
+                note(
+                    "calibration",
+                    f"{names.capitalize()}: where the segments turn against each other in the movement, with a leg "
+                    f"that is straight seen from the front.{said}",
+                )
             )
         found.landmarks |= places
         found.joints += [n for n in lacking if n in places and (n.startswith("knee") or leg.marked_ankle() is None)]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
 from dynakin.model.calibration.checks import (
     check_masses,
@@ -80,7 +81,7 @@ class Measured:
     mass_kg: float
     height_m: float | None
     parts: dict[str, list[PlacedPart]]
-    messages: tuple[str, ...]
+    messages: tuple[Message, ...]
     trial: Trial
     unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
     held: dict[str, str]  # coordinate -> why nothing shows it
@@ -108,7 +109,7 @@ class _Marked:
     chosen: list[Candidate]
     locks: dict[str, float | None]
     bare: dict[str, tuple[str, ...]]  # segment without markers -> coordinates that are locked because of that
-    height: tuple[float | None, str] | None  # of a model in space, whose landmarks need it
+    height: tuple[float | None, list[Message]] | None  # of a model in space, whose landmarks need it
     needed: set[MarkerKey]
 
 
@@ -127,7 +128,7 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     model, subject, table = asked.model, asked.subject, asked.table
     if asked.functional and not model.sided:
         raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
-    messages: list[str] = []
+    messages: list[Message] = []
     trials = _matched(asked, messages)
     marked = _marked(asked, trials, messages)
     model, finder, locks = marked.model, marked.finder, marked.locks
@@ -138,7 +139,10 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     check_body_mass(subject, mass_kg, height_m)
     if subject.sex is None:
         messages.append(
-            "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors)."
+            note(
+                "sex",
+                "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors).",
+            )
         )
     unmeasured = _unmeasured_lengths(model, table, found.landmarks, height_m, messages)
     geometry, posture = find_geometry(model, found.landmarks, locks, unmeasured)
@@ -177,30 +181,30 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     )
 
 
-def _matched(asked: Asked, messages: list[str]) -> _Trials:
+def _matched(asked: Asked, messages: list[Message]) -> _Trials:
     """Markers and ground of the recordings."""
     model, recording, static = asked.model, asked.recording, asked.static
     recognised = recognise(recording, asked.marker_set)
     messages += recognised.messages
     as_asked = Trial.of(recording, recognised.match, asked.ground or asked.find_ground(recording, recognised.match))
-    messages += as_asked.ground.how
+    messages += [note("ground", text) for text in as_asked.ground.how]
     trial = as_asked.facing() if model.floating else as_asked
     side = "both"
     if not model.sided:
         side, how = choose_side(trial.match, recording, asked.side)
-        messages.append(how)
+        messages.append(note("calibration", how))
     if static is None:
         return _Trials(as_asked, trial, trial, side)
     stands = recognise(static, recognised.match.marker_set)
-    messages += [f"{said} ({static.name})" for said in stands.messages]
+    messages += [replace(said, text=f"{said.text} ({static.name})") for said in stands.messages]
     source = Trial.of(static, stands.match, asked.find_ground(static, stands.match))
     source = source.facing() if model.floating else source
     if other := another_person(recording, static):
-        messages.append(f"Warning: {other}. Lengths and marker places are those of {static.name}.")
+        messages.append(warning("calibration", f"{other}. Lengths and marker places are those of {static.name}."))
     return _Trials(as_asked, trial, source, side)
 
 
-def _marked(asked: Asked, trials: _Trials, messages: list[str]) -> _Marked:
+def _marked(asked: Asked, trials: _Trials, messages: list[Message]) -> _Marked:
     """What of the model the markers show, and the recipes of its landmarks with what they need to know of the body."""
     model, match, source = asked.model, trials.trial.match, trials.source
     # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
@@ -223,7 +227,7 @@ def _marked(asked: Asked, trials: _Trials, messages: list[str]) -> _Marked:
     return _Marked(model, finder, chosen, locks, bare, height, needed_markers(model, finder, locks))
 
 
-def _calibration_frames(asked: Asked, trials: _Trials, marked: _Marked, messages: list[str]) -> _Still:
+def _calibration_frames(asked: Asked, trials: _Trials, marked: _Marked, messages: list[Message]) -> _Still:
     """Where the person stands still, or what comes nearest to it."""
     model, finder, needed, static = marked.model, marked.finder, marked.needed, asked.static
     trial, source = trials.trial, trials.source
@@ -235,12 +239,14 @@ def _calibration_frames(asked: Asked, trials: _Trials, marked: _Marked, messages
     if static is not None:
         frames, which = source.calibration_frames(needed, wished)
     source = trial if static is None else _at_origin(model, source, finder, frames)
-    messages.append(f"Lengths and marker places: {which}.")
+    messages.append(note("details", f"Lengths and marker places: {which}."))
     window = standing_window(source.recording)
     return _Still(trial, source, frames, window is not None and window.start <= frames[0] < window.stop)
 
 
-def _landmarks(asked: Asked, marked: _Marked, still: _Still, messages: list[str]) -> tuple[Completed, tuple[str, ...]]:
+def _landmarks(
+    asked: Asked, marked: _Marked, still: _Still, messages: list[Message]
+) -> tuple[Completed, tuple[str, ...]]:
     """Landmarks of the standing person, in space completed by movement and proportions; joints that no marker shows."""
     model, finder, source = marked.model, marked.finder, still.source
     standing = source.median(still.frames)
@@ -274,14 +280,21 @@ def _landmarks(asked: Asked, marked: _Marked, still: _Still, messages: list[str]
     if unmarked:
         joints = listed([words(name) for name in sorted(unmarked)])
         messages.append(
-            f"Warning: no marker shows {joints}: they are where the movement, or else the "
-            "proportions of an adult who stands, has them, to one or two centimetres. Give a standing trial with "
-            "markers on knees and ankles (--static)."
+            warning(
+                "joints",
+                f"no marker shows {joints}: they are where the movement, or else the proportions of an adult who "
+                "stands, "
+                "has them, to one or two centimetres. The zeros of the legs' angles may be 10 deg off, and moments at "
+                "knee and ankle are two to five times less sure; the deviations say so. Give a standing trial with "
+                "markers on knees and ankles (--static).",
+            )
         )
     return found, unmarked
 
 
-def _mass_and_height(asked: Asked, marked: _Marked, still: _Still, messages: list[str]) -> tuple[float, float | None]:
+def _mass_and_height(
+    asked: Asked, marked: _Marked, still: _Still, messages: list[Message]
+) -> tuple[float, float | None]:
     """Of the person; a planar model's height is asked for only now, and by markers about its origin."""
     set_, names = still.source.match.marker_set, still.source.match.names
     weighed = [still.source, still.trial] if asked.static is not None else [still.trial]
@@ -293,7 +306,7 @@ def _mass_and_height(asked: Asked, marked: _Marked, still: _Still, messages: lis
         marked.finder.height_m if marked.model.sided else None,
     )
     height_m, how_high = marked.height or find_height(asked.subject, asked.recordings, still.source)
-    messages += [how, how_high]
+    messages += [*how, *how_high]
     return mass_kg, height_m
 
 
@@ -345,7 +358,7 @@ def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: n
     return trial.about(trial.ground.points_to_laboratory(origin_G))
 
 
-def _joint_widths(entries: list[Recording], finder: LandmarkFinder) -> tuple[dict[str, float], list[str]]:
+def _joint_widths(entries: list[Recording], finder: LandmarkFinder) -> tuple[dict[str, float], list[Message]]:
     """Widths (m) of knee and ankle by joint and side ("knee_r") as recordings say them, and a sentence where used."""
     keys = {f"{joint}_{side[0]}": side for joint in ("knee", "ankle") for side in SIDES}
     found: dict[str, float] = {}
@@ -358,11 +371,11 @@ def _joint_widths(entries: list[Recording], finder: LandmarkFinder) -> tuple[dic
     if not found:
         return {}, []
     words = ", ".join(f"{keys[key]} {key.split('_')[0]} {1000.0 * width:.0f} mm" for key, width in found.items())
-    return found, [f"Joint widths: the recording's own ({words})."]
+    return found, [note("calibration", f"Joint widths: the recording's own ({words}).")]
 
 
 def _unmeasured_lengths(
-    model: ModelFile, table: BodyTable, landmarks: dict[str, Array], height_m: float | None, messages: list[str]
+    model: ModelFile, table: BodyTable, landmarks: dict[str, Array], height_m: float | None, messages: list[Message]
 ) -> dict[str, float]:
     found: dict[str, float] = {}
     for length in model.lengths:
@@ -376,7 +389,10 @@ def _unmeasured_lengths(
             )
         found[length.name] = part.length_per_height * height_m
         messages.append(
-            f"Length {length.name}: {1000 * found[length.name]:.0f} mm from the height ({table.name}), no markers."
+            note(
+                "calibration",
+                f"Length {length.name}: {1000 * found[length.name]:.0f} mm from the height ({table.name}), no markers.",
+            )
         )
     return found
 
@@ -388,13 +404,18 @@ def _first_posture(
     trial: Trial,
     needed: set[MarkerKey],
     standing: Posture,
-    messages: list[str],
+    messages: list[Message],
 ) -> Posture:
     usable = np.flatnonzero(trial.usable(needed))
     if not len(usable):
         raise ModelError(f"{trial.match.where}: no frame shows all markers of the joint centres")
     first = int(usable[0])
     if first > 0:
-        messages.append(f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.")
+        messages.append(
+            note(
+                "details",
+                f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.",
+            )
+        )
     positions = trial.median(np.array([first]))
     return find_posture(model, geometry, finder.find(positions), standing)

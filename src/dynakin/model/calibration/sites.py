@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note
 from dynakin.model.calibration.frames import FIRST_FRAMES, Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.posture import Posture, find_posture, frame_landmarks
@@ -27,13 +28,13 @@ class Candidate:
     segment: str
 
 
-def candidates(model: ModelFile, match: MarkerMatch, side: str) -> tuple[list[Candidate], list[str]]:
+def candidates(model: ModelFile, match: MarkerMatch, side: str) -> tuple[list[Candidate], list[Message]]:
     """Markers of the chosen side on the model's segments, and sentences on those that are left out."""
     sites = match.sites(side, not model.sided)
     homes = {key: _home(model, m.segment, key[1]) for m, key, _ in sites}
     chosen = [Candidate(m, key, name, home) for m, key, name in sites if (home := homes[key]) is not None]
     messages = [
-        f"Marker {name} left out: model {model.name} has no segment {marker.segment!r}."
+        note("calibration", f"Marker {name} left out: model {model.name} has no segment {marker.segment!r}.")
         for marker, key, name in sites
         if homes[key] is None
     ]
@@ -45,7 +46,7 @@ def candidates(model: ModelFile, match: MarkerMatch, side: str) -> tuple[list[Ca
         if marker.measures(not model.sided) and marker.aliases(s) and (marker.name, s) not in match.names
     ]
     if absent:
-        messages.append(f"Markers that the recording lacks, left out: {', '.join(absent)}.")
+        messages.append(note("calibration", f"Markers that the recording lacks, left out: {', '.join(absent)}."))
     return chosen, messages
 
 
@@ -72,7 +73,7 @@ def as_marked(model: ModelFile, match: MarkerMatch, finder: LandmarkFinder) -> M
 
 def find_locks(
     model: ModelFile, match: MarkerMatch, chosen: list[Candidate]
-) -> tuple[dict[str, float | None], dict[str, tuple[str, ...]], list[str]]:
+) -> tuple[dict[str, float | None], dict[str, tuple[str, ...]], list[Message]]:
     """Coordinates to lock, segments without markers with the coordinates that are locked because of that, and sentences
     on them.
 
@@ -87,7 +88,7 @@ def find_locks(
         c.name: None if c.as_measured else c.value or 0.0 for c in model.coordinates if c.locked
     }
     bare: dict[str, tuple[str, ...]] = {}
-    messages, lacking = list[str](), list[str]()
+    messages, lacking = list[Message](), list[str]()
     marked = {name for name, count in counts.items() if count}
     for segment in reversed(model.segments):  # children stand after their parents
         if segment.name in marked:
@@ -96,7 +97,9 @@ def find_locks(
         segment = by_name[name]
         if count == 1:
             one = next(c.recorded for c in chosen if c.segment == name)
-            messages.append(f"Segment {name} has one marker only ({one}): its angle leans on its neighbours.")
+            messages.append(
+                note("calibration", f"Segment {name} has one marker only ({one}): its angle leans on its neighbours.")
+            )
         if count or all(locks.get(axis.coordinate) is not None for axis in segment.axes):
             continue
         rule = segment.without_markers
@@ -117,7 +120,11 @@ def find_locks(
             locks.setdefault(axis.coordinate, value)
         names = ", ".join(axis.coordinate for axis in joint.axes)
         at = "the angle found while standing" if rule.value_deg is None else f"{rule.value_deg:g} deg"
-        messages.append(f"Segment {name} has no markers: locked to {rule.lock_to} (coordinate {names} at {at}).")
+        messages.append(
+            note(
+                "calibration", f"Segment {name} has no markers: locked to {rule.lock_to} (coordinate {names} at {at})."
+            )
+        )
     if lacking:
         raise ModelError(
             f"{match.where}: {'; '.join(lacking)}, and the model file has no without_markers rule for "
@@ -134,7 +141,7 @@ def place_sites(
     geometry: Geometry,
     model: ModelFile,
     needed: set[MarkerKey],
-) -> tuple[list[Site], list[str]]:
+) -> tuple[list[Site], list[Message]]:
     """Local positions from the calibration frames; from later frames for a marker that is not seen there.
 
     Args:
@@ -145,7 +152,7 @@ def place_sites(
     standing = source.median(frames)
     flat = np.array([1.0, 1.0, 0.0 if model.planar else 1.0])
     sites: list[Site] = []
-    messages: list[str] = []
+    messages: list[Message] = []
     for c in chosen:
         point = standing.get(c.key)
         if point is not None and np.isfinite(point).all():
@@ -156,7 +163,10 @@ def place_sites(
             later = np.flatnonzero(trial.usable(needed | {c.key}))[:FIRST_FRAMES]
             if not len(later):
                 messages.append(
-                    f"Marker {c.recorded} left out: never seen together with the markers of the joint centres."
+                    note(
+                        "calibration",
+                        f"Marker {c.recorded} left out: never seen together with the markers of the joint centres.",
+                    )
                 )
                 continue
             found = []
@@ -165,8 +175,11 @@ def place_sites(
                 found.append(now.to_local(c.segment, trial.paths[c.key][frame] * flat))
             local = np.median(found, axis=0)
             messages.append(
-                f"Marker {c.recorded} is not seen in the calibration frames: placed from "
-                f"{trial.recording.time[later[0]]:.2f} s on."
+                note(
+                    "calibration",
+                    f"Marker {c.recorded} is not seen in the calibration frames: placed from "
+                    f"{trial.recording.time[later[0]]:.2f} s on.",
+                )
             )
         sites.append(site_of(c, local, model.sided))
     return sites, messages

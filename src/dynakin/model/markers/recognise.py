@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynakin.errors import ModelError, RecordingError
+from dynakin.messages import Message, note, warning
 from dynakin.model.markers.anatomy import anatomy
 from dynakin.model.markers.draft.draft import Guess, drafted, further, names_of
 from dynakin.model.markers.geometry import (
@@ -30,7 +31,6 @@ from dynakin.model.markers.match import (
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.markers.swaps import Swap, distance_words, find_swaps
 from dynakin.recordings.recording import Recording
-from dynakin.results.records import WARNING
 from dynakin.units import PERSON_HEIGHT_M
 
 _LISTED = 8  # names in a sentence
@@ -139,12 +139,12 @@ class Recognised:
 
     Attributes:
         match: without the markers that are not where their names say.
-        messages: the choice, and a Warning for each of these.
+        messages: the choice, and a warning for each of these.
         wrong_n: markers whose places contradict a body, apart from exchanged ones.
     """
 
     match: MarkerMatch
-    messages: tuple[str, ...]
+    messages: tuple[Message, ...]
     wrong_n: int = 0
 
 
@@ -186,7 +186,7 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
     if more:
         choice = f"{choice.removesuffix('.')}; used by what their names say: {_places(more)}."
     doubtful = [guess for guess in more if guess.place and guess.sure != "sure" and _on_leg_or_pelvis(guess)]
-    messages = [choice, *best.messages]
+    messages = [note("marker set", choice), *best.messages]
     if doubtful:
         messages.insert(1, _guessed_words(recording, len(doubtful), f" ({_places(doubtful)})"))
     match = replace(best.match, guessed=tuple(guess.recorded for guess in doubtful))
@@ -224,11 +224,13 @@ def _on_leg_or_pelvis(guess: Guess) -> bool:
     return anatomy()["places"][guess.place].get("segment") in (_ROOT, *LEG)
 
 
-def _guessed_words(recording: Recording, n: int, which: str = "") -> str:
-    return (
-        f"Warning: no marker set has these names; {n} of {len(recording.seen_names)} markers{which} are used at places "
-        "guessed from their names and from where they lie. Look at them: "
-        f"dynakin markers new {recording.path or 'TRIAL'} -o my.toml, then --markers my.toml"
+def _guessed_words(recording: Recording, n: int, which: str = "") -> Message:
+    return warning(
+        "guessed",
+        f"no marker set has these names; {n} of {len(recording.seen_names)} markers{which} are used at places "
+        "guessed from their names and from where they lie. Joint centres, angles and moments are as wrong as a place "
+        "that is guessed wrongly. Look at them: "
+        f"dynakin markers new {recording.path or 'TRIAL'} -o my.toml, then --markers my.toml",
     )
 
 
@@ -269,7 +271,7 @@ def choice_words(match: MarkerMatch, ranked: Sequence[Fit]) -> str:
 
 
 def checked(recording: Recording, match: MarkerMatch) -> Recognised:
-    """A match without the markers that lie elsewhere than their names say, each with a Warning.
+    """A match without the markers that lie elsewhere than their names say, each with a warning.
 
     Raises:
         ModelError: exchanged labels without which there is no pelvis or no leg, or a size that nobody has.
@@ -282,14 +284,14 @@ def checked(recording: Recording, match: MarkerMatch) -> Recognised:
     _refuse_wrong_size(found, expected, match.where)
     swaps, found, order = find_swaps(recording, match, keys, found, expected)
     wrong = _misplaced(match, keys, found, expected, body_height_m(found.ordered(order), expected), order)
-    messages = []
+    messages = list[Message]()
     for swap in swaps:
         match, said = _without_swap(match, swap, float(recording.time[0]))
         messages.append(said)
     for k, why in wrong.items():
         if keys[k] in match.names:
             match = match.without([keys[k]], f"{why}: it is not where its name says")
-            messages.append(f"Warning: {why}; {recording_name(match, keys[k])} is left out: check its label.")
+            messages.append(warning("labels", f"{why}; {recording_name(match, keys[k])} is left out: check its label."))
     return Recognised(match, tuple(messages), len(wrong))
 
 
@@ -311,7 +313,7 @@ def recording_name(match: MarkerMatch, key: MarkerKey) -> str:
     return match.marker_set.marker(key[0]).aliases(key[1])[0]
 
 
-def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[MarkerMatch, str]:
+def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[MarkerMatch, Message]:
     """Exchanged for less than half of the trial, and not at its start, on which places are measured: as they are."""
     when = ""
     if swap.span_s is not None:
@@ -319,12 +321,16 @@ def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[Marke
     looks = f"{swap.what} look swapped{when} ({swap.evidence})"
     later = swap.span_s is not None and swap.span_s[0] > start_s + _START_S
     if swap.share < _SHORT or (later and swap.share < _HALF):
-        return match, f"Warning: {looks}: correct the labels; they are used as they are, and refused where they jump."
+        return match, warning(
+            "labels", f"{looks}: correct the labels; they are used as they are, and refused where they jump."
+        )
     one_place = len(swap.pairs) == 1 and len({place for place, _ in swap.keys}) == 1
     here = swap.keys <= match.names.keys()  # another exchange may have had one left out
     if swap.span_s is None and one_place and here:
         # right for left of one place: both are seen, and nothing else would put both where a body has them
-        return match.exchanged(*swap.pairs[0]), f"Warning: {looks}; each is used as the other: correct the labels."
+        return match.exchanged(*swap.pairs[0]), warning(
+            "labels", f"{looks}; each is used as the other: correct the labels."
+        )
     left = match.without(swap.keys, f"{looks}: {CORRECT}")
     if not lacking(match.marker_set, match.names) and (lacks := lacking(left.marker_set, left.names)):
         raise ModelError(
@@ -332,7 +338,7 @@ def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[Marke
             "corrected"
         )
     both = "both are" if len(swap.keys) == 2 else "they are"
-    return left, f"Warning: {looks}; {both} left out: correct the labels in the recording."
+    return left, warning("labels", f"{looks}; {both} left out: correct the labels in the recording.")
 
 
 def _misplaced(
@@ -364,7 +370,7 @@ def _refuse_wrong_set(found: Recognised, where: str) -> None:
         example = found.messages[0]  # `checked` says nothing but warnings
         raise ModelError(
             f"{where}: the names fit marker set {found.match.marker_set.name}, but {found.wrong_n} of {total} markers "
-            f"are not where it says ({example.removeprefix(WARNING).split(';')[0]}); expected the set that was "
+            f"are not where it says ({example.text.split(';')[0]}); expected the set that was "
             "used, or one of your own: dynakin markers new TRIAL -o my.toml"
         )
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.body import find_mass
 from dynakin.model.opensim.description import Marker, OpenSimModel
 from dynakin.model.opensim.sites import with_mass
@@ -40,16 +41,19 @@ def limits_of(source: OpenSimModel) -> dict[str, Interval]:
     return found
 
 
-def beyond_range(source: OpenSimModel, start: dict[str, float]) -> list[str]:
+def beyond_range(source: OpenSimModel, start: dict[str, float]) -> list[Message]:
     """Says where the root starts beyond what the file clamps it to: OpenSim would draw it at the end of that range."""
     clamped = [c for c in independent_coordinates(source) if c.name in source.floating]
     names = [c.name for c in clamped if not c.limits[0] <= start[c.name] <= c.limits[1]]
     if not names:
         return []
     return [
-        f"Warning: {', '.join(names)} begin beyond the range to which {source.path.name} clamps them; OpenSim may not "
-        "follow coordinates.mot there. Widen the range in the file, or give --forward: X is then the way the person "
-        "faces."
+        warning(
+            "range",
+            f"{', '.join(names)} begin beyond the range to which {source.path.name} clamps them; OpenSim may not "
+            "follow coordinates.mot there. Widen the range in the file, or give --forward: X is then the way the "
+            "person faces.",
+        )
     ]
 
 
@@ -71,30 +75,44 @@ def of_subject(
     recordings: list[Recording],
     ground: GroundFrame,
     feet: dict[str, list[str]],
-    messages: list[str],
+    messages: list[Message],
 ) -> OpenSimModel:
     """The model with the subject's mass: as given, or as the plates say, or as it stands in the file."""
     try:
         mass, how = find_mass(subject, [(recording, ground) for recording in recordings], feet)
     except ModelError:
-        messages.append(f"Mass {source.mass:.2f} kg: the OpenSim file's, as it is neither given nor measured.")
+        messages.append(
+            note("mass", f"Mass {source.mass:.2f} kg: the OpenSim file's, as it is neither given nor measured.")
+        )
         return source
-    messages.append(how)
-    messages.append(f"Masses and inertias of the OpenSim file ({source.mass:.2f} kg) times {mass / source.mass:.3f}.")
+    messages += how
+    messages.append(
+        note(
+            "details",
+            f"Masses and inertias of the OpenSim file ({source.mass:.2f} kg) times {mass / source.mass:.3f}.",
+        )
+    )
     return with_mass(source, mass)
 
 
-def estimated_bodies(source: OpenSimModel, lightest_share: float, messages: list[str]) -> list[str]:
+def estimated_bodies(source: OpenSimModel, lightest_share: float, messages: list[Message]) -> list[str]:
     """Bodies whose ten numbers are estimated, of this share of the mass at least; says which are not."""
     heavy = [b for b in source.bodies if b.mass > 0.0 and b.mass >= lightest_share * source.mass]
     impossible = [body.name for body in heavy if not body.rigid.possible()]
     if impossible:
-        messages.append(f"Inertia of {', '.join(impossible)} belongs to no real body in the file: not estimated.")
+        messages.append(
+            note(
+                "calibration", f"Inertia of {', '.join(impossible)} belongs to no real body in the file: not estimated."
+            )
+        )
     chosen = [body.name for body in heavy if body.name not in impossible]
     kept = [body.name for body in source.bodies if body.name not in (*chosen, *impossible)]
     if kept:
         messages.append(
-            f"Inertia of bodies below {100.0 * lightest_share:g} % of the mass is the file's: {', '.join(kept)}."
+            note(
+                "calibration",
+                f"Inertia of bodies below {100.0 * lightest_share:g} % of the mass is the file's: {', '.join(kept)}.",
+            )
         )
     return chosen
 

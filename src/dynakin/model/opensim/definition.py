@@ -11,6 +11,7 @@ import numpy as np
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure, starting_state
 from dynakin.model.calibration.pose_start import start_posture
 from dynakin.model.inertia import INERTIA_NAMES
@@ -113,31 +114,43 @@ class OpenSimDefinition:
         """As ``Definition.calibrate``; ``side`` does not matter, for the file says where its markers are. The ground is
         the laboratory, Y up; X is forward where it is asked for, or where the file holds the body so that it cannot
         head anywhere."""
-        source, options, messages = self.source, self.options, list(self.source.left_out)
+        source, options, messages = (
+            self.source,
+            self.options,
+            [note("calibration", text) for text in self.source.left_out],
+        )
         refuse_other_gravity(source)
         find = find_laboratory_frame if source.floating else find_ground_frame
-        chosen, said = sites(source, options.leave_out, recording)
+        chosen, measured_by = sites(source, options.leave_out, recording)
         on_feet = foot_markers(source, chosen)
         frame = ground or find(recording, vertical=vertical, forward=forward, pairs=facing_pairs(source, chosen))
-        messages += frame.how
+        messages += [note("ground", text) for text in frame.how]
         if options.scale_masses:
             source = of_subject(
                 source, self.subject, [r for r in (static, recording) if r is not None], frame, on_feet, messages
             )
         else:
-            messages.append(f"Mass {source.mass:.2f} kg: the OpenSim file's.")
-        messages += said
+            messages.append(note("mass", f"Mass {source.mass:.2f} kg: the OpenSim file's."))
+        messages += [note("calibration", text) for text in measured_by]
         if static is not None:
-            messages.append("The standing trial gives the mass only.")
+            messages.append(note("calibration", "The standing trial gives the mass only."))
         kept = options.marker_places == "kept"
         messages.append(
-            "Marker places: kept as the OpenSim file has them."
-            if kept
-            else "Marker places: the OpenSim file's, calibrated by the recording."
+            note(
+                "details",
+                "Marker places: kept as the OpenSim file has them."
+                if kept
+                else "Marker places: the OpenSim file's, calibrated by the recording.",
+            )
         )
         lock = unseen(source, {marker.body for marker, _ in chosen}) if options.lock_unseen else []
         if lock:
-            messages.append(f"Coordinates that move no measured marker, locked at the file's value: {', '.join(lock)}.")
+            messages.append(
+                note(
+                    "calibration",
+                    f"Coordinates that move no measured marker, locked at the file's value: {', '.join(lock)}.",
+                )
+            )
         carried = estimated_bodies(source, options.lightest_share, messages)
 
         def spec_at(values: dict[str, float]) -> _core.ModelSpec:
@@ -158,8 +171,11 @@ class OpenSimDefinition:
             _core.Model(spec_at({})), measured[first], limits=limits, where=str(recording.path or recording.name)
         )
         messages.append(
-            f"Start: frame {first + 1} ({recording.time[first]:.2f} s), where the model of {source.path.name} fits the "
-            f"markers to {1000.0 * fit.rms_m:.0f} mm (root mean square)."
+            note(
+                "details",
+                f"Start: frame {first + 1} ({recording.time[first]:.2f} s), where the model of {source.path.name} "
+                f"fits the markers to {1000.0 * fit.rms_m:.0f} mm (root mean square).",
+            )
         )
         messages += beyond_range(source, fit.coordinates)
         spec = spec_at(fit.coordinates)

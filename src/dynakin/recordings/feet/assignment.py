@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.errors import ConfigError
+from dynakin.messages import Message, note, warning
 from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
 from dynakin.recordings.feet.findings import exchanged, plate_findings
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
@@ -333,7 +334,10 @@ class _Assignment:
         )
         if missing := [foot for foot in self.feet if foot not in self.contacts]:
             said.append(
-                f"No markers of the {' and '.join(missing)} foot: nobody sees whether it stands off the plates."
+                note(
+                    "plates",
+                    f"No markers of the {' and '.join(missing)} foot: nobody sees whether it stands off the plates.",
+                )
             )
         return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons))
 
@@ -341,61 +345,79 @@ class _Assignment:
         time = self.recording.time
         return ", ".join(f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(flags))
 
-    def belt_in_words(self) -> list[str]:
+    def belt_in_words(self) -> list[Message]:
         found = []
         for name, foot in self.contacts.items():
             speed = np.linalg.norm(foot.support_velocity, axis=1)
             if speed.any():
                 low, high = speed[speed > 0.0].min(), speed.max()
                 size = f"{high:.2f}" if high - low < 0.02 else f"{low:.2f} to {high:.2f}"
-                found.append(f"The {name} foot stands on a belt that moves at {size} m/s, by its markers.")
+                found.append(
+                    note("plates", f"The {name} foot stands on a belt that moves at {size} m/s, by its markers.")
+                )
         return found
 
-    def off_in_words(self) -> list[str]:
+    def off_in_words(self) -> list[Message]:
         if not self.plates:
             return []
-        time, found, out = self.recording.time, list[str](), "what it carries is estimated there."
+        time, found, out = self.recording.time, list[Message](), "what it carries is estimated there."
         for k, foot in enumerate(self.feet):
             found += [
-                f"The {foot} foot stands off the plates from {time[a]:.2f} to {time[b - 1]:.2f} s: {out}"
+                note(
+                    "plates", f"The {foot} foot stands off the plates from {time[a]:.2f} to {time[b - 1]:.2f} s: {out}"
+                )
                 for a, b in runs(self.off[:, k])
             ]
             if self.hidden[:, k].any():
                 found.append(
-                    f"Nobody sees where the {foot} foot is from {self.spans(self.hidden[:, k])}: it may stand off the "
-                    f"plates, so {out}"
+                    note(
+                        "plates",
+                        f"Nobody sees where the {foot} foot is from {self.spans(self.hidden[:, k])}: it may stand off "
+                        f"the plates, so {out}",
+                    )
                 )
         return found
 
-    def owners_in_words(self, p: int) -> list[str]:
-        plate, owners, found = self.plates[p], self.on[:, :, p], list[str]()
+    def owners_in_words(self, p: int) -> list[Message]:
+        plate, owners, found = self.plates[p], self.on[:, :, p], list[Message]()
         if p in self.given:
-            found.append(f"{plate.name} carries the {self.given[p]} (given).")
+            found.append(note("plates", f"{plate.name} carries the {self.given[p]} (given)."))
         for k, foot in enumerate(self.feet):
             if owners[:, k].any():
                 how = "given" if plate.name in self.fixed else "by its centre of pressure"
-                found.append(f"{plate.name} carries the {foot} foot ({how}): {self.spans(owners[:, k])}.")
+                found.append(
+                    note("plates", f"{plate.name} carries the {foot} foot ({how}): {self.spans(owners[:, k])}.")
+                )
         both = np.flatnonzero(owners.sum(axis=1) > 1)
         if len(both):
             time = self.recording.time
             found.append(
-                f"Both feet stand on {plate.name} in {len(both)} frames from {time[both[0]]:.2f} to "
-                f"{time[both[-1]]:.2f} s: its wrench is divided between them by where each one's load is expected."
+                note(
+                    "plates",
+                    f"Both feet stand on {plate.name} in {len(both)} frames from {time[both[0]]:.2f} to "
+                    f"{time[both[-1]]:.2f} s: its wrench is divided between them by where each one's load is expected.",
+                )
             )
         return found
 
-    def lost_in_words(self, p: int) -> list[str]:
+    def lost_in_words(self, p: int) -> list[Message]:
         plate, time = self.plates[p], self.recording.time
         found = [
-            f"{plate.name} is not measured or at the end of its range from {time[a]:.2f} to {time[b - 1]:.2f} s: "
-            "what it carries is estimated there."
+            note(
+                "plates",
+                f"{plate.name} is not measured or at the end of its range from {time[a]:.2f} to {time[b - 1]:.2f} s: "
+                "what it carries is estimated there.",
+            )
             for a, b in runs(~plate.known)
         ]
         if len(self.contacts) == len(self.feet) and p not in self.given:
             alone = ~self.on[:, :, p].any(axis=1) & (plate.push > JUDGED_N) & ~self.hidden.any(axis=1)
             found += [
-                f"Warning: {plate.name} carries up to {np.nanmax(plate.wrench[a:b, 1]):.0f} N where no foot stands, "
-                f"from {time[a]:.2f} to {time[b - 1]:.2f} s: the total wrench is left out there."
+                warning(
+                    "plates",
+                    f"{plate.name} carries up to {np.nanmax(plate.wrench[a:b, 1]):.0f} N where no foot stands, "
+                    f"from {time[a]:.2f} to {time[b - 1]:.2f} s: the total wrench is left out there.",
+                )
                 for a, b in runs(alone)
             ]
         return found

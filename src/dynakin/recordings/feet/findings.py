@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import runs
+from dynakin.messages import Message, warning
 from dynakin.recordings.feet.contact import NEAR_M, FootContact
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.hull import distance_to_hull
@@ -43,7 +44,7 @@ Contacts = Sequence[FootContact | None]
 
 def plate_findings(
     time: Array, feet: Sequence[str], contacts: Contacts, plates: Sequence[GroundPlate], soles: Soles, on: Flags
-) -> list[str]:
+) -> list[Message]:
     """Sentences.
 
     Args:
@@ -53,9 +54,12 @@ def plate_findings(
         return []
     swapped = exchanged(contacts, plates)
     said = [
-        f"Warning: {plates[p].name} and {plates[q].name} have been exchanged: each one's load lies under a foot that "
-        "stands once it is put at the other's place, and next to none of it at its own. Exchange the two in the file "
-        "(their channels or their corners); their loads are left out."
+        warning(
+            "plates",
+            f"{plates[p].name} and {plates[q].name} have been exchanged: each one's load lies under a foot that "
+            "stands once it is put at the other's place, and next to none of it at its own. Exchange the two in the "
+            "file (their channels or their corners); their loads are left out.",
+        )
         for p, q in swapped
     ]
     for p, plate in enumerate(plates):
@@ -109,7 +113,7 @@ def _carried_over(points: Array, source: Array, target: Array) -> Array:
 
 def _off_place(
     plate: GroundPlate, feet: Sequence[str], contacts: Contacts, soles: Soles, on: Flags, p: int
-) -> str | None:
+) -> Message | None:
     """Whether a plate's load comes and goes with a foot, but lies off it."""
     offsets: dict[int, list[Array]] = {}
     for first, end in runs(plate.push > JUDGED_N):
@@ -130,10 +134,11 @@ def _off_place(
         return None
     k, found = next(iter(offsets.items()))
     x, z = np.nanmedian(np.concatenate(found), axis=0)
-    return (
-        f"Warning: {plate.name} lies off its place: its centre of pressure is {np.hypot(x, z):.2f} m (X {x:+.2f}, "
+    return warning(
+        "plates",
+        f"{plate.name} lies off its place: its centre of pressure is {np.hypot(x, z):.2f} m (X {x:+.2f}, "
         f"Z {z:+.2f} m of the ground frame) from the middle of the {feet[k]} foot's sole while its load comes and goes "
-        "with that foot. Correct the plate's place (its corners or origin) in the file."
+        "with that foot. Correct the plate's place (its corners or origin) in the file.",
     )
 
 
@@ -144,7 +149,7 @@ def _covers(foot: FootContact, first: int, end: int) -> bool:
     return bool(inside) and max(inside) > TOGETHER * max(lengths)
 
 
-def _drift(time: Array, plate: GroundPlate, soles: Soles, owners: Flags) -> str | None:
+def _drift(time: Array, plate: GroundPlate, soles: Soles, owners: Flags) -> Message | None:
     """Whether a plate reads something while no foot is near it."""
     place = plate.corners if plate.corners is not None else _pressed_at(plate)
     if place is None:
@@ -163,13 +168,14 @@ def _drift(time: Array, plate: GroundPlate, soles: Soles, owners: Flags) -> str 
     low, middle, high = np.percentile(read, (5.0, 50.0, 95.0))
     if not UNLOADED_N < abs(middle) < MOST_DRIFT_N:
         return None
-    return (
-        f"Warning: {plate.name} reads {low:.0f} to {high:.0f} N while no foot is near it, between {time[clear][0]:.2f} "
-        f"and {time[clear][-1]:.2f} s: zero it before the trial, or take it off with plate_loads."
+    return warning(
+        "plates",
+        f"{plate.name} reads {low:.0f} to {high:.0f} N while no foot is near it, between {time[clear][0]:.2f} "
+        f"and {time[clear][-1]:.2f} s: zero it before the trial, or take it off with plate_loads.",
     )
 
 
-def _dead(time: Array, plate: GroundPlate, feet: Sequence[str], contacts: Contacts, on: Flags) -> str | None:
+def _dead(time: Array, plate: GroundPlate, feet: Sequence[str], contacts: Contacts, on: Flags) -> Message | None:
     """Whether a plate reads nothing although a foot stands wholly on it and no other plate carries that."""
     if plate.corners is None or (plate.push > UNLOADED_N).any():
         return None
@@ -182,10 +188,11 @@ def _dead(time: Array, plate: GroundPlate, feet: Sequence[str], contacts: Contac
                 continue
             beyond = plate.beyond(foot.outline[own])
             if np.isfinite(beyond).any() and np.nanmax(beyond) == 0.0:
-                return (
-                    f"Warning: {plate.name} reads nothing although the {feet[k]} foot stands on it from "
+                return warning(
+                    "plates",
+                    f"{plate.name} reads nothing although the {feet[k]} foot stands on it from "
                     f"{time[first]:.2f} to {time[end - 1]:.2f} s. Look whether its channels were connected, and leave "
-                    "it out of the file if not."
+                    "it out of the file if not.",
                 )
     return None
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import filled
+from dynakin.messages import Message
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N
@@ -55,8 +56,8 @@ class FootLoads:
     on: Flags
     given: Mapping[int, str] = field(default_factory=dict)
     others: Mapping[str, Array] = field(default_factory=dict)
-    messages: tuple[str, ...] = ()
-    reasons: tuple[str, ...] = ()
+    messages: tuple[Message, ...] = ()
+    reasons: tuple[Message, ...] = ()
 
     def with_undeclared(self, frames: Flags) -> FootLoads:
         """The same where something bears the person in these frames (T,) that no plate measures: the total is not

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from dynakin.errors import RecordingError
+from dynakin.messages import Message, note
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plates import read_plates
 from dynakin.recordings.formats.c3d_points import Points, sort_points
@@ -46,7 +47,7 @@ def read_c3d_results(path: Path) -> dict[str, Array]:
         RecordingError: as `read_c3d`.
     """
 
-    def results(data: Any, _: list[str]) -> dict[str, Array]:
+    def results(data: Any, _: list[Message]) -> dict[str, Array]:
         points, sorted_points = _points(data, Parameters(data["parameters"]))
         values = points.transpose(1, 2, 0)  # (N, T, 3)
         values = np.where((values == 0.0).all(axis=2, keepdims=True), np.nan, values)
@@ -55,7 +56,7 @@ def read_c3d_results(path: Path) -> dict[str, Array]:
     return _opened(Path(path), results)
 
 
-def _opened(path: Path, use: Callable[[Any, list[str]], _Read]) -> _Read:
+def _opened(path: Path, use: Callable[[Any, list[Message]], _Read]) -> _Read:
     import ezc3d
 
     layout_notes, corrections = check_c3d_file(path)
@@ -86,7 +87,7 @@ def _corrected(path: Path, corrections: list[Correction]) -> Any:
         return ezc3d.c3d(str(copy))
 
 
-def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) -> Recording:
+def _recording(data: Any, path: Path, options: ReadOptions, notes: list[Message]) -> Recording:
     parameters = Parameters(data["parameters"])
     rate = parameters.number("POINT", "RATE") or float(data["header"]["points"]["frame_rate"])
     if not SLOWEST_HZ <= rate <= FASTEST_HZ:
@@ -103,7 +104,9 @@ def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) ->
     first = first_frame(parameters, int(data["header"]["points"]["first_frame"]), path)
     start_notes = []
     if first:
-        start_notes.append(f"Time 0 is frame {first + 1} of the capture ({first / rate:.4g} s after its start).")
+        start_notes.append(
+            note("routine", f"Time 0 is frame {first + 1} of the capture ({first / rate:.4g} s after its start).")
+        )
 
     time = np.arange(frames) / rate
     analog = np.asarray(data["data"]["analogs"], dtype=float)[0]  # (channels, samples)

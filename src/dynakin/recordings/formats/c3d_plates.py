@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynakin.errors import RecordingError
+from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plate_types import TYPES, plate_wrench
 from dynakin.recordings.limits import check_wrench
@@ -50,7 +51,7 @@ def read_plates(
     markers: Array,
     unit_m: float,
     options: ReadOptions,
-) -> tuple[tuple[Plate, ...], list[str]]:
+) -> tuple[tuple[Plate, ...], list[Message]]:
     """All plates that can be read at the marker times, and notes; a warning for each that cannot.
 
     Args:
@@ -61,17 +62,23 @@ def read_plates(
     """
     used = parameters.number("FORCE_PLATFORM", "USED") or 0.0
     if used == 0.0:
-        return (), ["The file has no force plates."]
+        return (), [note("routine", "The file has no force plates.")]
     if used not in range(_MOST_PLATES + 1):
         return (), [
-            f"Warning: no plate read: found {used:g} in FORCE_PLATFORM:USED, expected a whole number from 0 to "
-            f"{_MOST_PLATES}."
+            warning(
+                "plates",
+                f"no plate read: found {used:g} in FORCE_PLATFORM:USED, expected a whole number from 0 to "
+                f"{_MOST_PLATES}.",
+            )
         ]
     per_frame, odd = divmod(analog.shape[1], len(time))
     if per_frame == 0 or odd:
         return (), [
-            f"Warning: no plate read: found {analog.shape[1]} analog samples for {len(time)} frames, expected a whole "
-            "number a frame."
+            warning(
+                "plates",
+                f"no plate read: found {analog.shape[1]} analog samples for {len(time)} frames, expected a whole "
+                "number a frame.",
+            )
         ]
     step = (time[1] - time[0]) / per_frame if len(time) > 1 else 1.0
     analog_time = np.arange(analog.shape[1]) * step + time[0]
@@ -83,7 +90,7 @@ def read_plates(
             check_wrench(name, analog_time, raw.force, raw.moment, "")
         except RecordingError as error:
             why = str(error).removeprefix(": ").removeprefix(f"{name} ")
-            notes.append(f"Warning: {name} left out: {why}.")
+            notes.append(warning("plates", f"{name} left out: {why}."))
             continue
         raws.append(raw)
         notes += said
@@ -103,13 +110,13 @@ def read_plates(
             rate = 1 / (time[1] - time[0])
             delay = CausalLowPass(rate * per_frame, 0.4 * rate).delay_s
             how = f"causal Butterworth low-pass, {1e3 * delay:.3g} ms late"
-        notes.append(f"Plates resampled from {per_frame} samples a frame ({how}).")
+        notes.append(note("routine", f"Plates resampled from {per_frame} samples a frame ({how})."))
     return tuple(plates), notes
 
 
 def _raw(
     name: str, parameters: Parameters, k: int, analog: Array, markers: Array, unit_m: float
-) -> tuple[_Raw, list[str]]:
+) -> tuple[_Raw, list[Message]]:
     """Plate k, and notes.
 
     Raises:
@@ -133,11 +140,13 @@ def _raw(
         if plain is None or any(re.fullmatch(r"[munk\u00b5]?v(olts?)?", word.casefold()) for word in units):
             raise RecordingError(f"it has type {kind} and no calibration in FORCE_PLATFORM:CAL_MATRIX")
         kind = plain
-        notes.append(f"{name} has no calibration in the file: its channels are taken as calibrated.")
+        notes.append(note("plates", f"{name} has no calibration in the file: its channels are taken as calibrated."))
     factors, known, strange = _factors(parameters, channels, unit_m, kind, calibration)
     for signal, word in strange:
         taken = "N" if signal == "force" else "N times the unit of its points"
-        notes.append(f"Warning: {name}: unknown unit {word!r} of its {signal}s in ANALOG:UNITS, {taken} taken.")
+        notes.append(
+            warning("plates", f"{name}: unknown unit {word!r} of its {signal}s in ANALOG:UNITS, {taken} taken.")
+        )
     if (
         calibration is None
         and TYPES[kind].outputs.count("moment") == 3
@@ -146,11 +155,14 @@ def _raw(
         stays = f"the centre of pressure would stay within {1000.0 * _CENTRED_M:.0f} mm of the plate's centre"
         if known:
             notes.append(
-                f"Warning: {name}: by the unit that the file gives for its moments {stays}: they are given in another."
+                warning(
+                    "plates",
+                    f"{name}: by the unit that the file gives for its moments {stays}: they are given in another.",
+                )
             )
         else:
             factors = np.where([signal == "moment" for signal in TYPES[kind].outputs], 1.0, factors)
-            notes.append(f"{name}: the file gives no unit for its moments: N m taken, as else {stays}.")
+            notes.append(note("plates", f"{name}: the file gives no unit for its moments: N m taken, as else {stays}."))
     origin = _origin(parameters, k, kind) * unit_m
     force, moment = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=factors)
     z = np.cross(axis_x, axis_y)
@@ -249,18 +261,23 @@ def _factors(
     return np.array(found), given, list(strange)
 
 
-def _offset_note(raw: _Raw) -> list[str]:
+def _offset_note(raw: _Raw) -> list[Message]:
     push = raw.force @ raw.surface.normal
     idle = np.abs(push) < JUDGED_N
     pulls = push < -JUDGED_N
     if pulls.mean() > _LASTING_PULL:
         return [
-            f"Warning: {raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in "
-            f"{100.0 * pulls.mean():.0f} % of the recording: taken as empty there. Zero it before the trial."
+            warning(
+                "plates",
+                f"{raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in "
+                f"{100.0 * pulls.mean():.0f} % of the recording: taken as empty there. Zero it before the trial.",
+            )
         ]
     if idle.mean() < 0.05 or np.abs(np.median(push[idle])) < _OFFSET_WORTH_A_NOTE_N:
         return []
-    return [f"{raw.name} reads {np.median(push[idle]):.3g} N where nobody stands on it (not taken off)."]
+    return [
+        note("plates", f"{raw.name} reads {np.median(push[idle]):.3g} N where nobody stands on it (not taken off).")
+    ]
 
 
 def _at_marker_times(raw: _Raw, time_in: Array, time: Array, options: ReadOptions) -> Plate:

@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
+from dynakin.messages import Message, note
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.recording import Array
 
@@ -36,7 +37,7 @@ class Points:
     names: tuple[str, ...]
     outputs: list[int]
     labels: tuple[str, ...]
-    notes: list[str]
+    notes: list[Message]
 
 
 def sort_points(parameters: Parameters, points: Array) -> Points:
@@ -55,13 +56,21 @@ def sort_points(parameters: Parameters, points: Array) -> Points:
     keep = [k for k in rest if k not in {*masses, *axes}]
     notes = []
     if unlabelled:
-        notes.append(f"{len(unlabelled)} unlabelled points left out.")
+        notes.append(note("routine", f"{len(unlabelled)} unlabelled points left out."))
     if outputs:
-        notes.append(f"{len(outputs)} computed points left out: {', '.join(labels[k] for k in outputs)}.")
+        notes.append(
+            note("routine", f"{len(outputs)} computed points left out: {', '.join(labels[k] for k in outputs)}.")
+        )
     if axes:
-        notes.append(f"{len(axes)} ends of segments' axes are no markers and left out: {', '.join(stems)}.")
+        notes.append(
+            note("routine", f"{len(axes)} ends of segments' axes are no markers and left out: {', '.join(stems)}.")
+        )
     if masses:
-        notes.append(f"Computed centre of mass is no marker and left out: {', '.join(labels[k] for k in masses)}.")
+        notes.append(
+            note(
+                "routine", f"Computed centre of mass is no marker and left out: {', '.join(labels[k] for k in masses)}."
+            )
+        )
     return Points(keep, tuple(labels[k] for k in keep), outputs, tuple(labels), notes)
 
 

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from dynakin.errors import RecordingError
 from dynakin.files import require_file
+from dynakin.messages import Message, note
 
 _TYPES = {-1: 1, 1: 1, 2: 2, 4: 4}  # text, byte, integer, float: bytes per value
 _MAX_DIMENSIONS = 7
@@ -172,7 +173,7 @@ _BLOCK = 512
 _INTEL, _DEC = 84, 85  # 86, MIPS, is unknown to ezc3d
 
 
-def check_c3d_file(path: Path) -> tuple[list[str], list[Correction]]:
+def check_c3d_file(path: Path) -> tuple[list[Message], list[Correction]]:
     """Notes on what the file says twice and differently, and what has to be corrected so that ezc3d reads it right.
 
     Raises:
@@ -274,7 +275,7 @@ class Header:
         return 0 <= size - self.data_start - self.frames * self.frame_bytes <= 2 * _BLOCK
 
 
-def check_counts(header: Header, groups: Groups, size: int, path: Path) -> tuple[list[str], list[Correction]]:
+def check_counts(header: Header, groups: Groups, size: int, path: Path) -> tuple[list[Message], list[Correction]]:
     """Notes on contradictions that are harmless, or that the size of the file settles, and corrections for the latter.
 
     Raises:
@@ -310,12 +311,17 @@ def check_counts(header: Header, groups: Groups, size: int, path: Path) -> tuple
     _check_rotations(groups, size, path)
     notes = settled.notes
     if frames and frames != header.frames and needed <= size:
-        notes.append(f"The header says {header.frames} frames, POINT:FRAMES {frames:g}: the latter is used.")
+        notes.append(
+            note("recording", f"The header says {header.frames} frames, POINT:FRAMES {frames:g}: the latter is used.")
+        )
     block = _number(groups, "POINT", "DATA_START", 0)
     used = header.data_start // 512 + 1
     if block and block != used:
         notes.append(
-            f"The header says that data begin in block {used}, POINT:DATA_START {block:g}: the former is used."
+            note(
+                "recording",
+                f"The header says that data begin in block {used}, POINT:DATA_START {block:g}: the former is used.",
+            )
         )
     return notes, settled.corrections
 
@@ -325,7 +331,7 @@ class _Settled:
 
     def __init__(self, groups: Groups, *, trusted: bool) -> None:
         self._groups, self._trusted = groups, trusted
-        self.notes: list[str] = []
+        self.notes: list[Message] = []
         self.corrections: list[Correction] = []
 
     def by_header(self, group: str, name: str, value: float) -> bool:
@@ -336,7 +342,11 @@ class _Settled:
             return False
         self.corrections.append(correction)
         here, there = f"{record.first():g}", f"{round(value, 2):g}"
-        self.notes.append(f"{group}:{name} says {here}, the header and the file's size {there}: the latter is used.")
+        self.notes.append(
+            note(
+                "recording", f"{group}:{name} says {here}, the header and the file's size {there}: the latter is used."
+            )
+        )
         return True
 
 

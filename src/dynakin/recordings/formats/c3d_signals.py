@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from dynakin.errors import RecordingError
+from dynakin.messages import Message, note
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.recording import Array
 from dynakin.recordings.signals import AnalogChannel, Event
@@ -31,7 +32,7 @@ def first_frame(parameters: Parameters, in_header: int, path: Path) -> int:
     return (high << 16) + low - 1 if high else in_header
 
 
-def read_events(parameters: Parameters, start_s: float, time: Array) -> tuple[tuple[Event, ...], list[str]]:
+def read_events(parameters: Parameters, start_s: float, time: Array) -> tuple[tuple[Event, ...], list[Message]]:
     """The EVENT group's events at the recording's times (T,) s, and notes.
 
     Args:
@@ -50,9 +51,11 @@ def read_events(parameters: Parameters, start_s: float, time: Array) -> tuple[tu
     inside = (at >= first) & (at <= last)
     if start_s and not inside.any() and len(at) and bool(((at + start_s >= first) & (at + start_s <= last)).all()):
         at, inside = at + start_s, np.ones(len(at), dtype=bool)
-        notes.append("Events are counted from the file's first frame, not from the start of the capture.")
+        notes.append(
+            note("recording", "Events are counted from the file's first frame, not from the start of the capture.")
+        )
     if count_out := int((~inside).sum()):
-        notes.append(f"{count_out} of {len(at)} events lie outside the file's frames: left out.")
+        notes.append(note("recording", f"{count_out} of {len(at)} events lie outside the file's frames: left out."))
     events = [
         Event(
             round(float(at[k]), 6),  # the file's seconds are of single precision

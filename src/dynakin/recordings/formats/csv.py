@@ -21,6 +21,7 @@ from typing import Literal
 import numpy as np
 
 from dynakin.errors import RecordingError
+from dynakin.messages import Message
 from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table
@@ -119,7 +120,7 @@ def _markers(table: Table, columns: list[str]) -> tuple[tuple[str, ...], Array]:
     return tuple(spots), np.stack(raw, axis=1).reshape(shape) if raw else np.empty(shape)
 
 
-def _unit(raw: Array) -> tuple[float, Literal["mm", "m"], list[str]]:
+def _unit(raw: Array) -> tuple[float, Literal["mm", "m"], list[Message]]:
     """The format is in m; what cannot be a person in m is in the unit in which it can."""
     factor, unit, notes = length_unit("", raw)
     return (factor, unit, notes) if raw.shape[1] >= _PERSON and factor != 1.0 else (1.0, "m", [])

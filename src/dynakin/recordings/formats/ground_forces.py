@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from dynakin.errors import RecordingError
+from dynakin.messages import Message, note
 from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, parse_column
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.formats.time_stamps import settled_times
@@ -19,7 +20,7 @@ from dynakin.recordings.resampling import ReadOptions, low_pass, resample, same_
 _MIN_RATE_RATIO = 0.99
 
 
-def plates_from_table(table: Table) -> tuple[tuple[Plate, ...], tuple[str, ...]]:
+def plates_from_table(table: Table) -> tuple[tuple[Plate, ...], tuple[Message, ...]]:
     """The plates of a ground-force table (N, m, N m; ground-on-person, laboratory frame) at the table's own
     times.
 
@@ -42,17 +43,17 @@ def plates_from_table(table: Table) -> tuple[tuple[Plate, ...], tuple[str, ...]]
         )
     notes = list(table.notes)
     if others:
-        notes.append(f"{table.path.name}: columns not used: {', '.join(others)}.")
+        notes.append(note("recording", f"{table.path.name}: columns not used: {', '.join(others)}."))
     plates = []
     for group in groups:
-        plate, note = _plate(group, table)
+        plate, said = _plate(group, table)
         plates.append(plate)
-        notes += note
-    plates, said = _one_sign(plates)
-    return tuple(plates), tuple(notes + said)
+        notes += said
+    plates, turned = _one_sign(plates)
+    return tuple(plates), (*notes, *turned)
 
 
-def _one_sign(plates: list[Plate]) -> tuple[list[Plate], list[str]]:
+def _one_sign(plates: list[Plate]) -> tuple[list[Plate], list[Message]]:
     """The plates with those turned that pull while others push, along the axis that carries the most; all of them the
     same way is left to the check, which knows what is up."""
     sizes = np.sum([np.abs(np.nan_to_num(plate.force)).sum(axis=0) for plate in plates], axis=0)
@@ -66,7 +67,7 @@ def _one_sign(plates: list[Plate]) -> tuple[list[Plate], list[str]]:
     return found, turned_in_words([plate.name for plate in plates], turned)
 
 
-def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[str]]:
+def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[Message]]:
     name = f"plate {group.plate}".strip()
     notes = []
     for quantity in ("force", "point"):
@@ -78,7 +79,7 @@ def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[str]]:
             )
     torque = group.columns.get("torque", {})
     if not torque:
-        notes.append(f"{name} has no free moment columns: 0 taken.")
+        notes.append(note("recording", f"{name} has no free moment columns: 0 taken."))
     force, point = (_three(table, group.columns[quantity]) for quantity in ("force", "point"))
     free = _three(table, torque) if torque else np.zeros_like(force)
     quiet = (force == 0.0).all(axis=1)
@@ -114,17 +115,19 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
     time, stamps = settled_times(table.time, table.values[:, columns])
     table = replace(table, time=time)
     plates, notes = plates_from_table(table)
-    notes += tuple(f"{table.path.name}: {text}" for text in stamps)
+    notes += tuple(said.of(table.path.name) for said in stamps)
     if recording.plates:
-        notes += (f"{table.path.name} replaces the {len(recording.plates)} plates of {recording.name}.",)
+        text = f"{table.path.name} replaces the {len(recording.plates)} plates of {recording.name}."
+        notes += (note("recording", text),)
     untouched = same_times(table.time, recording.time)
     if not untouched:
         _check_cover(recording, table)
         first, last = table.time[0], table.time[-1]
-        notes += (
+        text = (
             f"{table.path.name}: {len(table.time)} rows from {first:g} s to {last:g} s brought to the "
-            f"{recording.n_frames} marker frames ({'causal' if options.causal else 'zero-phase'} filter).",
+            f"{recording.n_frames} marker frames ({'causal' if options.causal else 'zero-phase'} filter)."
         )
+        notes += (note("routine", text),)
     if untouched and options.plate_filter_hz is None and options.force_threshold_n is None:
         return recording.with_plates(plates, notes)
     return recording.with_plates(tuple(_resampled(plate, table, recording, options) for plate in plates), notes)

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.errors import RecordingError
+from dynakin.messages import Message, note
 from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows
 from dynakin.recordings.recording import Array
 
@@ -43,7 +44,7 @@ class Table:
     values: Array
     in_degrees: bool | None
     path: Path
-    notes: tuple[str, ...] = ()
+    notes: tuple[Message, ...] = ()
 
     def column(self, name: str) -> Array:
         """One column (T,) as the file has it; RecordingError lists the columns if it is not there."""
@@ -85,7 +86,7 @@ def read_table(path: str | Path) -> Table:
     body = ((k + 1, split_cells(lines[k])) for k in range(top + 1, len(lines)))
     empty = f"has no rows of numbers after line {top + 1}"
     table, time, notes, time_notes = timed_rows(body, columns, path, empty=empty)
-    notes = [f"{path.name}: {note}" for note in notes + time_notes]
+    notes = [said.of(path.name) for said in notes + time_notes]
     notes += _count_notes(header, len(table), len(columns), path)
     return Table(tuple(columns[1:]), time, table[:, 1:], _in_degrees(header, path), path, tuple(notes))
 
@@ -101,16 +102,21 @@ def _names_line(lines: list[str], path: Path) -> int:
     raise RecordingError(f"{path}: is not a MOT or STO table, found no line of column names that begins with 'time'")
 
 
-def _count_notes(header: dict[str, str], rows: int, columns: int, path: Path) -> list[str]:
+def _count_notes(header: dict[str, str], rows: int, columns: int, path: Path) -> list[Message]:
     notes = []
     said_rows, said_columns = header.get("nrows", ""), header.get("ncolumns", "")
     if said_columns and _count(said_columns) not in (None, columns):
-        notes.append(f"{path.name}: the header says {said_columns:.20} columns, the file names {columns}.")
+        notes.append(
+            note("recording", f"{path.name}: the header says {said_columns:.20} columns, the file names {columns}.")
+        )
     said = _count(said_rows)
     if said is not None and said != rows:
         cut = " (has it been cut off?)" if said > rows else ""
         notes.append(
-            f"{path.name}: the header says {said:.6g} rows, the file holds {rows}{cut}: all of these are used."
+            note(
+                "recording",
+                f"{path.name}: the header says {said:.6g} rows, the file holds {rows}{cut}: all of these are used.",
+            )
         )
     return notes
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from dynakin.errors import RecordingError
 from dynakin.files import read_bytes
+from dynakin.messages import Message, note
 from dynakin.recordings.limits import LONGEST_GAP_S, rate_problem
 from dynakin.recordings.recording import Array
 
@@ -80,7 +81,7 @@ def split_cells(line: str, separator: str | None = None) -> list[str]:
 
 def parse_rows(
     lines: Iterable[tuple[int, Sequence[str]]], names: Sequence[str], path: Path
-) -> tuple[Array, list[int], list[str]]:
+) -> tuple[Array, list[int], list[Message]]:
     """Numbers (R, K) of rows of cells, the line of each, and notes.
 
     Decimal commas are read where the file has no decimal points as well.
@@ -94,7 +95,7 @@ def parse_rows(
         "." in cell for _, cells in rows for cell in cells
     ):
         rows = [(number, [cell.replace(",", ".") for cell in cells]) for number, cells in rows]
-        notes.append("Numbers are written with decimal commas.")
+        notes.append(note("recording", "Numbers are written with decimal commas."))
     table = np.array([parse_row(cells, names, path, number) for number, cells in rows])
     return table, [number for number, _ in rows], notes
 
@@ -142,7 +143,7 @@ def timed_rows(
     empty: str,
     time_at: int = 0,
     rate: float | None = None,
-) -> tuple[Array, Array, list[str], list[str]]:
+) -> tuple[Array, Array, list[Message], list[Message]]:
     """Numbers (R, K) and times (R,) s of a table, notes on its rows and on its times.
 
     Args:
@@ -160,7 +161,7 @@ def timed_rows(
     return values, time, notes, time_notes
 
 
-def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array, list[str]]:
+def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array, list[Message]]:
     """Times (T,) s that the file rounds to more than a tenth of a step, put back on the even grid that they come from,
     and a note; all others as they are.
 
@@ -183,8 +184,8 @@ def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array,
             even = np.clip(time[0], low, high) + k / rate
             if np.abs(even - time).max() < 1e-6 / rate:
                 return time, []
-            note = f"Times are rounded to {rounded_to:g} s in the file: taken as an even {rate:.6g} Hz."
-            return even, [note]
+            text = f"Times are rounded to {rounded_to:g} s in the file: taken as an even {rate:.6g} Hz."
+            return even, [note("recording", text)]
     return time, []
 
 

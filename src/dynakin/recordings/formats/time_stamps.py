@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import by_neighbours
+from dynakin.messages import Message, note
 from dynakin.recordings.recording import centred, even_step, scatters
 
 Array = npt.NDArray[np.float64]
@@ -21,7 +22,7 @@ _SURE = 3.0
 """Standard errors by which what is decided is known."""
 
 
-def settled_times(time: Array, samples: Array, rate_in_header: float | None = None) -> tuple[Array, list[str]]:
+def settled_times(time: Array, samples: Array, rate_in_header: float | None = None) -> tuple[Array, list[Message]]:
     """Times (T,) s on the even grid about which they scatter, and a note, where samples (T, K; NaN where missing) show
     that they were taken evenly; all others as they are."""
     grid = _grid(time, rate_in_header)
@@ -32,11 +33,11 @@ def settled_times(time: Array, samples: Array, rate_in_header: float | None = No
     step = float(grid[1] - grid[0])
     if scatter < _SCATTER * step or not scatters(off, step) or not _stamped(off, samples, step):
         return time, []
-    note = (
+    text = (
         f"Time stamps scatter by {1000.0 * scatter:.1f} ms (RMS) about an even {1.0 / step:.6g} Hz, and what was "
         "measured is smoother without that: taken as even."
     )
-    return grid, [note]
+    return grid, [note("recording", text)]
 
 
 def _grid(time: Array, rate_in_header: float | None) -> Array | None:

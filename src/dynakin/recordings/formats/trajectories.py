@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import by_neighbours, runs
 from dynakin.errors import RecordingError
+from dynakin.messages import Message, note, warning
 from dynakin.recordings.recording import Array, rate_of
 from dynakin.units import length_factor
 
@@ -45,7 +46,7 @@ _MOSTLY = 2.0
 """How many times as often as any other of its name a marker is seen to be the one that is meant."""
 
 
-def length_unit(word: str, raw: Array) -> tuple[float, Literal["mm", "m"], list[str]]:
+def length_unit(word: str, raw: Array) -> tuple[float, Literal["mm", "m"], list[Message]]:
     """Metres per unit, the unit to write back in, and notes.
 
     Args:
@@ -64,13 +65,13 @@ def length_unit(word: str, raw: Array) -> tuple[float, Literal["mm", "m"], list[
         factor = 1.0 if span < _METRES_BELOW else 1e-2 if span < _CENTIMETRES_BELOW else 1e-3
         found = f"The length unit {word!r} is not known" if word else "The file names no length unit"
         word = {1.0: "m", 1e-2: "cm", 1e-3: "mm"}[factor]
-        notes.append(f"{found}: {word} taken, as the markers span {span:.4g} of them.")
+        notes.append(note("recording", f"{found}: {word} taken, as the markers span {span:.4g} of them."))
     if factor not in (1.0, 1e-3):
-        notes.append(f"The file is in {word}; markers are written back in metres.")
+        notes.append(note("recording", f"The file is in {word}; markers are written back in metres."))
     return factor, ("mm" if factor == 1e-3 else "m"), notes
 
 
-def distinct_names(names: tuple[str, ...], markers: Array) -> tuple[tuple[str, ...], Array, list[str]]:
+def distinct_names(names: tuple[str, ...], markers: Array) -> tuple[tuple[str, ...], Array, list[Message]]:
     """Names that are each used once, their markers (T, K, 3) m, and notes on those that were used more often.
 
     Of markers of one name, those that are never seen, or where the other is, go; those that are never seen together
@@ -94,12 +95,19 @@ def distinct_names(names: tuple[str, ...], markers: Array) -> tuple[tuple[str, .
         if len(kept) == 1:
             labels = [name]
             notes.append(
-                f"Marker {name!r} is in the file {len(doubled)} times, never at different places: taken as one."
+                note(
+                    "recording",
+                    f"Marker {name!r} is in the file {len(doubled)} times, never at different places: taken as one.",
+                )
             )
         else:
             labels = _labels(name, kept, set(counts))
             who = " and ".join(repr(label) for label in sorted(labels))
-            notes.append(f"Warning: marker {name!r} is in the file {len(doubled)} times, at different places: {who}.")
+            notes.append(
+                warning(
+                    "recording", f"marker {name!r} is in the file {len(doubled)} times, at different places: {who}."
+                )
+            )
         new_names += labels
         columns += kept
     return tuple(new_names), np.stack(columns, axis=1) if columns else markers, notes
@@ -136,7 +144,7 @@ def _labels(name: str, places: list[Array], taken: set[str]) -> list[str]:
     return labels
 
 
-def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Path) -> tuple[Array, list[str]]:
+def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Path) -> tuple[Array, list[Message]]:
     """Markers (T, M, 3) without what was never measured: a point that has any coordinate missing, or is exactly 0, 0,
     0, is NaN as a whole, and so are frames that repeat the one before and gaps that were filled by straight lines.
 
@@ -147,11 +155,13 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
         RecordingError: so many frames repeat others that the rate is another.
     """
     markers = markers.copy()  # infinite stays: `Recording` refuses it
-    notes: list[str] = []
+    notes: list[Message] = []
     origin = (markers == 0.0).all(axis=2)
     if origin.any():
         who = ", ".join(name for name, hit in zip(names, origin.any(axis=0), strict=True) if hit)
-        notes.append(f"Markers at exactly 0, 0, 0 taken as missing ({int(origin.sum())} samples: {who}).")
+        notes.append(
+            note("recording", f"Markers at exactly 0, 0, 0 taken as missing ({int(origin.sum())} samples: {who}).")
+        )
     markers, said = _without_placeholders(names, markers)
     notes += said
     partial = np.isnan(markers).any(axis=2)
@@ -169,13 +179,18 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
                 f"{path}: {text}; expected each frame once, at the rate of the cameras "
                 f"({rate * (1 - again.mean()):.0f} Hz?): export it so"
             )
-        notes.append(f"Warning: {text}. They are taken as missing; export the recording without filled frames.")
+        notes.append(
+            warning("recording", f"{text}. They are taken as missing; export the recording without filled frames.")
+        )
         markers[again] = np.nan
     if lines.any():
         who = ", ".join(name for name, hit in zip(names, np.asarray(lines.any(axis=0)), strict=True) if hit)
         notes.append(
-            f"Warning: gaps were filled by straight lines: {who}. They are taken as missing ({np.count_nonzero(lines)} "
-            "samples)."
+            warning(
+                "recording",
+                f"gaps were filled by straight lines: {who}. They are taken as missing ({np.count_nonzero(lines)} "
+                "samples).",
+            )
         )
         markers[lines] = np.nan
     notes += _left_out(markers, time)
@@ -186,14 +201,16 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
         share = ", ".join(
             f"{name} {100 * part:.3g} %" for name, part in zip(names, missing.mean(axis=0), strict=True) if part
         )
-        notes.append(f"Missing for part of the recording: {share}.")
+        notes.append(note("routine", f"Missing for part of the recording: {share}."))
     if len(names) and missing.all(axis=1).any():
         empty = np.flatnonzero(missing.all(axis=1))
-        notes.append(f"{len(empty)} frames have no marker at all, the first is frame {empty[0] + 1}.")
+        notes.append(
+            note("recording", f"{len(empty)} frames have no marker at all, the first is frame {empty[0] + 1}.")
+        )
     return markers, notes
 
 
-def _without_placeholders(names: tuple[str, ...], markers: Array) -> tuple[Array, list[str]]:
+def _without_placeholders(names: tuple[str, ...], markers: Array) -> tuple[Array, list[Message]]:
     """Without what a program wrote for a missing marker (-9999.99 thrice, say): a place far outside the volume, the
     same to the last digit in several samples of markers that are elsewhere else, or in all three coordinates."""
     flat = markers.reshape(-1, 3)
@@ -217,8 +234,8 @@ def _without_placeholders(names: tuple[str, ...], markers: Array) -> tuple[Array
     found = hit.reshape(markers.shape[:2])
     who = ", ".join(name for name, own in zip(names, np.asarray(found.any(axis=0)), strict=True) if own)
     where = ", ".join(f"{value:.6g}" for value in flat[np.argmax(hit)])
-    note = f"Markers at exactly {where} m, far outside the volume, taken as missing ({int(hit.sum())} samples: {who})."
-    return np.where(found[:, :, None], np.nan, markers), [note]
+    text = f"Markers at exactly {where} m, far outside the volume, taken as missing ({int(hit.sum())} samples: {who})."
+    return np.where(found[:, :, None], np.nan, markers), [note("recording", text)]
 
 
 def _repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
@@ -239,7 +256,7 @@ def _repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
     return found
 
 
-def _left_out(markers: Array, time: Array) -> list[str]:
+def _left_out(markers: Array, time: Array) -> list[Message]:
     """A warning of frames that were dropped and the times numbered on: all markers move between two frames as far as in
     several, by a cubic through their steps before and after. Where the times are uneven, or scatter, these are not
     numbered on."""
@@ -263,9 +280,12 @@ def _left_out(markers: Array, time: Array) -> list[str]:
     listed = [f"{k + 3} and {k + 4} ({time[k + 2]:.3f} s, as in {times[k]:.0f})" for k in jumps[:4]]
     more = f", and at {len(jumps) - 4} more places" if len(jumps) > 4 else ""
     return [
-        "Warning: frames were left out and the times numbered on, because all markers move as far as in several frames "
-        f"between frames {', '.join(listed)}{more}. Later times are wrong against the forces; export the recording "
-        "with every frame."
+        warning(
+            "recording",
+            "frames were left out and the times numbered on, because all markers move as far as in several frames "
+            f"between frames {', '.join(listed)}{more}. Later times are wrong against the forces; export the recording "
+            "with every frame.",
+        )
     ]
 
 
@@ -300,17 +320,26 @@ def _straight(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
     return found
 
 
-def timing_notes(time: Array, rate_in_header: float | None = None) -> list[str]:
+def timing_notes(time: Array, rate_in_header: float | None = None) -> list[Message]:
     """Sentences on a rate that contradicts the header and on uneven time steps."""
     if len(time) < 3:
         return []
-    notes: list[str] = []
+    notes: list[Message] = []
     step = np.diff(time)
     median = float(np.median(step))
     rate = rate_of(time)
     if rate_in_header and abs(rate_in_header / rate - 1) > 0.01:
-        notes.append(f"The header says {rate_in_header:g} Hz, the time column {rate:.4g} Hz: the latter is used.")
+        notes.append(
+            note(
+                "recording",
+                f"The header says {rate_in_header:g} Hz, the time column {rate:.4g} Hz: the latter is used.",
+            )
+        )
     if np.abs(step / median - 1).max() > 0.5:
         k = int(np.argmax(np.abs(step / median - 1)))
-        notes.append(f"Time steps are uneven: {step[k]:.4g} s after {time[k]:.6g} s, {median:.4g} s elsewhere.")
+        notes.append(
+            note(
+                "recording", f"Time steps are uneven: {step[k]:.4g} s after {time[k]:.6g} s, {median:.4g} s elsewhere."
+            )
+        )
     return notes

@@ -19,6 +19,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from dynakin.errors import RecordingError
+from dynakin.messages import Message, note
 from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows, trial_name
 from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.formats.trajectories import clean_markers, distinct_names, length_unit, timing_notes
@@ -101,10 +102,12 @@ def _number(text: str | None) -> float | None:
         return None
 
 
-def _count_notes(header: dict[str, str], frames: int, markers: int) -> list[str]:
+def _count_notes(header: dict[str, str], frames: int, markers: int) -> list[Message]:
     notes = []
     for key, found, word in (("numframes", frames, "frames"), ("nummarkers", markers, "markers")):
         said = _number(header.get(key))
         if said is not None and said != found:
-            notes.append(f"The header says {said:g} {word}, the file holds {found}: the latter are used.")
+            notes.append(
+                note("recording", f"The header says {said:g} {word}, the file holds {found}: the latter are used.")
+            )
     return notes

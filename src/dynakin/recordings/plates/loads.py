@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dynakin.errors import RecordingError
+from dynakin.messages import note
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
 from dynakin.recordings.orientation import axis_vector, find_vertical
 from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, centre_of_pressure
@@ -38,7 +39,11 @@ def without_plate_loads(recording: Recording, loads: Sequence[PlateLoad], vertic
         _relieved(plate, [load for load in loads if load.plate == plate.name], up) for plate in recording.plates
     )
     notes = tuple(
-        f"{load.plate}: a known load of {np.linalg.norm(load.force_n):.1f} N that is not the person's is taken off."
+        note(
+            "plates",
+            f"{load.plate}: a known load of {np.linalg.norm(load.force_n):.1f} N that is not the person's is taken "
+            "off.",
+        )
         for load in loads
     )
     return recording.with_plates(plates, notes)

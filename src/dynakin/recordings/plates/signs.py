@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.messages import Message, note
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array
 
@@ -30,13 +31,14 @@ def pulling(pushes: Sequence[Array]) -> npt.NDArray[np.bool_]:
     return np.where(own, pulls, pulls[np.argmax(largest)])
 
 
-def turned_in_words(names: Sequence[str], turned: npt.NDArray[np.bool_]) -> list[str]:
+def turned_in_words(names: Sequence[str], turned: npt.NDArray[np.bool_]) -> list[Message]:
     """A note that names the plates which were turned."""
     if not turned.any():
         return []
     if turned.all():
-        return ["The file stores the person's action on the plates; turned into the ground's reaction."]
+        return [note("plates", "The file stores the person's action on the plates; turned into the ground's reaction.")]
     those = " and ".join(name for name, turn in zip(names, turned, strict=True) if turn)
-    return [
+    text = (
         f"The file stores the person's action on {those}, unlike its other plates; turned into the ground's reaction."
-    ]
+    )
+    return [note("plates", text)]

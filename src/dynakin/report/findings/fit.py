@@ -1,4 +1,4 @@
-"""How the model fits: markers, constants on a bound, soft tissue, joint limits, frames that were lost."""
+"""How the model fits: markers, constants on a bound, soft tissue, joint limits."""
 
 from __future__ import annotations
 
@@ -20,16 +20,6 @@ ADVICE = {
     "limits": "Look at the film at that joint: where it does not go so far, a marker is swapped or off its place.",
     "adaptation": "Look at the film near the end: a marker that has moved, or a person who leaves the plates.",
 }
-
-
-def tracking(estimate: Estimate, metrics: Metrics) -> Insight | None:
-    """Frames that are no estimate; nothing is said where there are none."""
-    found = metrics["tracking"]
-    if not found or not found["lost_frames"]:
-        return None
-    whole = " The trial as a whole is no estimate." if found["trial_lost"] else ""
-    advice = "Look at the first of these times: markers swapped or off, or a movement that the start does not fit."
-    return Insight("warning", "Lost", found["verdict"] + whole, advice)
 
 
 def markers(estimate: Estimate, metrics: Metrics) -> Insight | None:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+from dynakin.messages import about
 from dynakin.report.findings.finding import Insight, Metrics
 from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import listed, number, plural, sentence
-from dynakin.results.records import WARNING, doubts_mass
 from dynakin.units import GRAVITY_M_S2
 
 # Part of the weight that no contact gives, from which it is said: good recordings leave 0.03 to 0.16 for a frame, one
 # frame that was filled 0.4.
 LEFT = 0.25
-# How the sentences begin that a run says of its plates as a whole.
-PLATE_WORDS = ("The plates are ", "By the motion of the centre of mass the plates are ")
-
 # What to do, in the words of a laboratory.
 ADVICE = {
     "left": "Look in the recording at that time for markers that jump or frames that were filled; moments there are "
@@ -42,14 +39,6 @@ def moments(estimate: Estimate, metrics: Metrics) -> Insight | None:
     return Insight("warning" if missed else "note", "Joint moments", " ".join(text), advice)
 
 
-def mass(estimate: Estimate, metrics: Metrics) -> Insight | None:
-    """Plates that contradict the mass: forces, moments and inertia are all wrong then."""
-    doubts = [text.removeprefix(WARNING) for text in estimate.messages if doubts_mass(text)]
-    if not doubts:
-        return None
-    return Insight("warning", "Mass", sentence(" ".join(doubts)), "Give the mass as weighed, with all that is worn.")
-
-
 def left(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """A force that no contact gives while the feet are on plates: a jump in the motion, as a filled frame makes one."""
     feet = metrics["feet"]
@@ -67,7 +56,7 @@ def left(estimate: Estimate, metrics: Metrics) -> Insight | None:
 def wrench(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """How far the model's total wrench is from the plates'."""
     rms = metrics["wrench"]["rms"]
-    about_plates = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and not doubts_mass(text)]
+    about_plates = [message.text for message in about(estimate.messages, "sum of the plates", "in step")]
     if not rms:
         why = " ".join(about_plates) or "No wrench was compared: none was measured, or none is modelled."
         return Insight("note", "Force plates", why)

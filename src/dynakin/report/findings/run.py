@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dynakin.report.findings.finding import Insight, Metrics
 from dynakin.results.estimate import Estimate
-from dynakin.results.failures import FAILED, LOG
+from dynakin.results.failures import LOG
 from dynakin.results.naming import listed, number, sentence, words
 
 
 def failed(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """Stages that failed after the estimate."""
-    said = [message.removeprefix(FAILED).strip() for message in estimate.messages if message.startswith(FAILED)]
+    said = [message.text for message in estimate.messages if message.level == "failure"]
     if not said:
         return None
     return Insight("warning", "Not made", " ".join(said), f"{LOG} has the details; please report them.")

@@ -51,7 +51,7 @@ def methods_section(page: Page) -> Section | None:
         "Other methods",
         f"{about_methods(trial)} {ABOUT_TABLE2}" if referred else "",
         tables=[table2_text(rows, title), table2_text(rows, "Every marker", single_markers=True)] if referred else [],
-        notes=trial.notes,
+        notes=tuple(map(str, trial.notes)),
         parts=[part for make in PARTS if (part := make(trial, "methods")).panels] if referred else [],
     )
 

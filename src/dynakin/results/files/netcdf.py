@@ -13,6 +13,7 @@ import xarray as xr
 
 from dynakin.arrays import finite
 from dynakin.files import with_nulls
+from dynakin.messages import as_attributes
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.config import versions
 from dynakin.results.measures.metrics import SCHEMA_VERSION
@@ -104,7 +105,7 @@ def full_dataset(estimate: Estimate) -> xr.Dataset:
         dynakin_version=versions()["dynakin"],
         model=estimate.model_name,
         frame=f"{estimate.ground.in_words}; SI, radians",
-        messages="\n".join(estimate.messages),
+        **as_attributes(estimate.messages),
         configuration=json.dumps(with_nulls(estimate.config), default=str, allow_nan=False),
     )
     return data

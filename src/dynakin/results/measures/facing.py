@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from dynakin.messages import Message, warning
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.power import root_coordinates
 
@@ -99,7 +100,7 @@ def _turns_about(angles: Array) -> Array:
     return axes
 
 
-def nearly_singular(estimate: Estimate) -> list[str]:
+def nearly_singular(estimate: Estimate) -> list[Message]:
     """Says when the pelvis leans so far, against the laboratory's axes, that its turns can hardly be separated."""
     if not set(PELVIS) <= root_coordinates(estimate):
         return []
@@ -109,6 +110,9 @@ def nearly_singular(estimate: Estimate) -> list[str]:
         return []
     frame = int(np.argmax(away))
     return [
-        f"Warning: {PELVIS[1]} reaches {middle[frame]:.0f} deg at {estimate.time[frame]:.2f} s: near 90 deg "
-        f"{PELVIS[0]} and {PELVIS[2]} turn about one axis. Give --forward, so that a forward lean is {PELVIS[0]}."
+        warning(
+            "angles",
+            f"{PELVIS[1]} reaches {middle[frame]:.0f} deg at {estimate.time[frame]:.2f} s: near 90 deg "
+            f"{PELVIS[0]} and {PELVIS[2]} turn about one axis. Give --forward, so that a forward lean is {PELVIS[0]}.",
+        )
     ]

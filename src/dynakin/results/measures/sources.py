@@ -18,7 +18,6 @@ from dynakin.arrays import runs
 from dynakin.recordings.feet.contact import SHARED_PLATE, UNMEASURED
 from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.naming import listed, sentence, words
-from dynakin.results.records import WARNING
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -195,7 +194,7 @@ def source_figures(data: xr.Dataset, sources: Codes, reasons: Sequence[str]) -> 
     legs = {name: _count(sources[:, columns].max(axis=1)) for name, columns in groups.items()}
     why: list[str] = []
     if any(count["measured"] < len(sources) for count in legs.values()):
-        why = [sentence(text.removeprefix(WARNING)) for text in reasons]
+        why = [sentence(text) for text in reasons]
     names = [str(name) for name in data["coordinate"].values]
     moving = {str(name) for name in data["element"].values}
     spoken = {leg: [k for k in own if names[k] in moving] or own for leg, own in groups.items()}  # not of locked joints

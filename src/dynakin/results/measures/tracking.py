@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import rms, runs
 from dynakin.errors import LostError
+from dynakin.messages import warning
 from dynakin.results.estimate import AXES, Estimate, values_of
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
 from dynakin.results.measures.sources import ABSENT
@@ -77,8 +78,11 @@ def without_lost(estimate: Estimate) -> Estimate:
                 continue
             empty = ABSENT if text in _SOURCES else 0 if variable.dtype.kind in "iu" else np.nan
             data[name] = variable.where(~data["lost"], empty).astype(variable.dtype)
-    warnings = [f"Warning: {in_words(estimate, found)}"] if found.lost.any() else []
-    return replace(estimate, data=data, messages=[*estimate.messages, *warnings], tracking=found)
+    messages = list(estimate.messages)
+    if found.lost.any():
+        whole = " The trial as a whole is no estimate." if lost_share(found) > MOST_LOST else ""
+        messages.append(warning("lost", f"{in_words(estimate, found)}{whole}"))
+    return replace(estimate, data=data, messages=messages, tracking=found)
 
 
 def lost_share(found: Tracking) -> float:

@@ -64,7 +64,7 @@ class Replay:
         return Streams(
             StreamInfo(recording.marker_names, recording.rate, clock, ordered=True),
             plates,
-            recording.notes,
+            tuple(map(str, recording.notes)),
             recording.subject,
             paced=self.speed > 0.0,
         )

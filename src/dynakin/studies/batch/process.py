@@ -9,6 +9,7 @@ from typing import Any
 
 from dynakin.errors import DynakinError
 from dynakin.files import write_csv, write_json
+from dynakin.messages import warnings_of
 from dynakin.pipeline.stages import judged
 from dynakin.progress import Progress
 from dynakin.report.insights import DOUBTS_FORCES, in_short, insights
@@ -47,7 +48,7 @@ class Batch:
 
     Attributes:
         rows: by session: ``fits`` (quantity, method, figures of `SignalFit`), ``verdict`` by preset, ``findings`` (the
-            titles of what it warns of), ``notes``, ``events``, ``nis_per_dof``.
+            titles of what it warns of), ``notes``, of these ``warnings``, ``events``, ``nis_per_dof``.
         failures: by session, why it gave nothing.
     """
 
@@ -98,14 +99,16 @@ def work_on(options: Options, payload: Session) -> dict[str, Any]:
     trial = result.comparison
     if trial is None or failures.found:
         saved = "the results are saved. " if options.files else ""
-        raise DynakinError(f"{saved}{' '.join(failures.messages())}")
+        raise DynakinError(f"{saved}{' '.join(map(str, failures.messages()))}")
     metrics = {name: compute_metrics(estimate) for name, estimate in estimates.items()}
     found = {name: insights(estimate, metrics[name]) for name, estimate in estimates.items()}
+    said = [*trial.notes, *result.estimate.messages]
     return {
         "fits": [[*key, *fit] for key, fit in trial_fits(trial).items()],
         "verdict": {name: in_short(each) for name, each in found.items()},
         "findings": list(dict.fromkeys(i.title for each in found.values() for i in each if i.level == "warning")),
-        "notes": [*trial.notes, *result.estimate.messages],
+        "notes": list(map(str, said)),
+        "warnings": [message.text for message in warnings_of(said)],
         "lost": lost,
         "nis_per_dof": {name: m["consistency"]["mean_nis_per_dof"] for name, m in metrics.items()},
         "events": {

@@ -54,7 +54,8 @@ def identify_on_trials(options: IdentifyOptions, payload: Sequence[Session]) -> 
     """Identify a subject on the trials that have plates, and write the file. What cannot be identified keeps the table.
 
     Returns:
-        use: "bodies" or "table". said: sentences, the last one the verdict. file: what was written, None: nothing.
+        use: "bodies" or "table". said: sentences, the last one the verdict. doubts: those of them that say what is
+            left out, or warn. file: what was written, None: nothing.
     """
     try:
         estimator, recordings, static, left_out = _trials(payload)
@@ -73,9 +74,11 @@ def identify_on_trials(options: IdentifyOptions, payload: Sequence[Session]) -> 
     except OSError as error:
         raise OutputError(f"{file}: cannot be written ({error.strerror or error})") from None
     found.subject.write(file)
+    doubts = [*(f"Left out: {text}." for text in left_out), *map(str, (*found.lost, *found.warned))]
     return {
         "use": found.subject.use,
-        "said": [*(f"Left out: {text}." for text in left_out), *found.lost, *found.warned, *found.decision.in_words()],
+        "said": [*doubts, *found.decision.in_words()],
+        "doubts": doubts,
         "file": str(file),
     }
 
@@ -117,7 +120,7 @@ def _message(outcome: Outcome) -> str:
 
 
 def _kept(why: str) -> dict[str, Any]:
-    return {"use": "table", "said": [f"The table is kept: {why}."], "file": None}
+    return {"use": "table", "said": [f"The table is kept: {why}."], "doubts": [], "file": None}
 
 
 def _trials(sessions: Sequence[Session]) -> tuple[Estimator, list[Recording], Recording | None, list[str]]:

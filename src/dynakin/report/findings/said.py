@@ -1,0 +1,82 @@
+"""What reading, calibration, plates and filter warned of: every warning is part of one finding, by its topic."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from dynakin.messages import TOPICS, Topic, warnings_of
+from dynakin.report.findings.finding import Insight, Metrics
+from dynakin.results.estimate import Estimate
+from dynakin.results.naming import sentence
+
+
+class _Kind(NamedTuple):
+    """A finding's title, what it takes together, and what to do, in the words of a laboratory."""
+
+    title: str
+    topics: tuple[Topic, ...]
+    advice: str
+
+
+_KINDS = (
+    _Kind(
+        "Lost",
+        ("lost",),
+        "Look at the first of these times: markers swapped or off, or a movement that the start does not fit.",
+    ),
+    _Kind("Guessed marker places", ("guessed",), "Correct the places that are wrong, and give that marker set."),
+    _Kind("Joint centres", ("joints",), "Give a standing trial with markers on knees and ankles (--static)."),
+    _Kind("Mass", ("weight",), "Give the mass as weighed, with all that is worn."),
+    _Kind("Subject", ("mass", "height", "sex"), "Give the mass and the height as measured (--mass, --height)."),
+    _Kind(
+        "Model scaling",
+        ("scaling",),
+        "Scale the model to the person again, by a standing trial, or run without --model: fullbody measures its own.",
+    ),
+    _Kind(
+        "Ankle angles",
+        ("ankles",),
+        "Give a standing trial (--static), or take these ankles' angles by their changes alone.",
+    ),
+    _Kind(
+        "Standing posture",
+        ("standing",),
+        "Record the person standing upright with straight knees, and give that (--static).",
+    ),
+    _Kind(
+        "Low-passed markers",
+        ("low-passed",),
+        "Export the markers without a filter (raw), and run them; of these use angles, and the moments of legs on "
+        "plates.",
+    ),
+    _Kind("Rate", ("rate",), "Look at which rate the cameras recorded, and whether the files say so."),
+    _Kind(
+        "Plates' place",
+        ("place",),
+        "Correct where the file has the plates (corners, origin, centres of pressure), or declare what else steadies "
+        "the person (--contact).",
+    ),
+    _Kind(
+        "Force plates",
+        ("plates", "sum of the plates", "in step"),
+        "Look with dynakin check which plates are read, where they lie, and what bears on them; declare what else does "
+        "(--contact).",
+    ),
+    _Kind("Model's ranges", ("range",), "Widen them in the file, or give --forward, before OpenSim takes the angles."),
+    _Kind("Pelvis angles", ("angles",), "Give --forward, or take the pelvis' and the hips' angles elsewhere only."),
+)
+_OTHER = _Kind(
+    "Recording",
+    tuple(topic for topic in TOPICS if all(topic not in kind.topics for kind in _KINDS)),
+    "Correct it in the file, or look at the film at these times, before you use what lies there.",
+)
+
+
+def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
+    """The findings that are warnings of the estimate, what is said twice once."""
+    found = []
+    for title, topics, advice in (*_KINDS, _OTHER):
+        own = [message.text for message in warnings_of(estimate.messages) if message.topic in topics]
+        if own:
+            found.append(Insight("warning", title, " ".join(map(sentence, dict.fromkeys(own))), advice))
+    return found
