@@ -20,6 +20,7 @@ from dynakin.messages import (
     warning,
     warnings_of,
 )
+from dynakin.pipeline.result import Result
 from dynakin.results.files.netcdf import full_dataset, write_netcdf
 from support.estimates.synthetic import make_estimate
 
@@ -60,3 +61,20 @@ def test_no_messages_are_none_and_files_that_had_no_topics_keep_the_levels() -> 
     assert from_attributes(full_dataset(replace(make_estimate(1.0), messages=[])).attrs) == []
     old = {"messages": "Warning: gaps were filled.\nMass 70 kg: given."}
     assert from_attributes(old) == [warning("recording", "gaps were filled."), note("recording", "Mass 70 kg: given.")]
+
+
+def test_metrics_are_those_of_the_file_with_messages_and_failures(tmp_path: Path) -> None:
+    import json
+
+    result = Result(replace(make_estimate(1.0), messages=[warning("plates", "one drifts.")]))
+    with result.failures.stage("a figure"):
+        raise MemoryError("too large")
+    written = json.loads((result.save(tmp_path / "out", check=False) / "metrics.json").read_text())
+    metrics = result.metrics()
+    assert (
+        metrics["messages"]
+        == written["messages"]
+        == ["Warning: one drifts.", "Failed: a figure: MemoryError: too large."]
+    )
+    assert metrics["failures"] == written["failures"] == ["a figure"]
+    assert written.keys() - metrics.keys() <= {"versions"}

@@ -87,9 +87,15 @@ class Result:
         return data.transpose("time", ...).to_pandas()
 
     def metrics(self) -> dict[str, Any]:
-        """The figures of ``metrics.json`` (see `dynakin.results.measures.metrics`); computed once, a copy is given. A
-        figure that cannot be had is None, and stands in ``failures``."""
-        return deepcopy(self._metrics)
+        """What ``metrics.json`` holds: the figures (see `dynakin.results.measures.metrics`; computed once, a copy is
+        given), ``messages``, and ``failures``, the stages that failed by now. A figure that cannot be had is None, and
+        stands there."""
+        figures = deepcopy(self._metrics)
+        messages = [*self.estimate.messages, *self.failures.messages()]
+        return figures | {
+            "messages": list(map(str, messages)),
+            "failures": [failure.stage for failure in self.failures.found],
+        }
 
     @cached_property
     def _metrics(self) -> dict[str, Any]:
@@ -206,9 +212,7 @@ class Result:
                 failed,
                 lambda path: self._write_page(whole, metrics, path),
             )
-            said: dict[str, Any] = {"messages": list(map(str, whole.messages))}
-            said["failures"] = [failure.stage for failure in failed.found]
-            write_metrics(metrics | said, made / "metrics.json")
+            write_metrics(self.metrics(), made / "metrics.json")
             if failed.found:
                 (made / LOG).write_text(failed.log(), encoding="utf-8", newline="\n")
 
