@@ -101,8 +101,10 @@ def as_attributes(messages: Iterable[Message]) -> dict[str, str]:
 
 def from_attributes(attributes: Mapping[str, Any]) -> list[Message]:
     """Messages that `as_attributes` wrote. Files of dynakin 0.1 have no topics: "recording" stands for all of them."""
-    lines = str(attributes.get("messages", "")).splitlines()
-    topics = str(attributes.get("message_topics", "")).splitlines() or ["recording"] * len(lines)
+    lines, topics = (str(attributes.get(key, "")).split("\n") for key in ("messages", "message_topics"))
+    if lines == [""]:
+        return []
+    topics = topics if "message_topics" in attributes else ["recording"] * len(lines)
     return [_read(topic, line) for topic, line in zip(topics, lines, strict=True)]
 
 

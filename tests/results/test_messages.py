@@ -40,7 +40,7 @@ def test_whoever_asks_gets_messages_by_topic_and_level() -> None:
 
 @pytest.mark.parametrize("topic", TOPICS)
 def test_topics_survive_saving_and_loading(topic: Topic, tmp_path: Path) -> None:
-    said = [note(topic, "A note."), warning(topic, "one: two."), Message(topic, "failure", "three.")]
+    said = [note(topic, "A note."), warning(topic, "one: two."), Message(topic, "failure", "three\u2028four.")]
     assert from_attributes(as_attributes(said)) == said
 
 
