@@ -31,7 +31,9 @@ QD = np.array([0.4, -0.1, 0.2, 0.5, -0.3, 0.6, 1.2, 0.4, -0.7, -1.5])
 QDD = np.array([1.0, 0.5, -1.0, 2.0, 1.0, -2.0, 5.0, -3.0, 2.0, 6.0])
 CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
-SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.015)
+RATE = np.array([-900.0, 4000.0, 300.0, 200.0, 100.0, 700.0])
+"""By how much the contact changes, N and N m a second."""
+SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.015, 0.004)
 MOVING, OFF_PLATES = 0.1, 0.2
 NONE = Sizes(*np.zeros(len(SIZES)), placed=np.inf, own_speeds=MOVING, own_off_plates=OFF_PLATES)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
@@ -265,6 +267,39 @@ def test_a_centre_of_mass_off_its_place_is_that_of_segments_that_are_changed() -
     assert not any(parts[block].any() for block in ("coordinates", "speeds", "accelerations"))
 
 
+def by_rate() -> Array:
+    """(C,) what moments change by a second, where the motion stays and the contact goes on changing."""
+    now, then = np.zeros((2, 3, 6))
+    now[2], then[2] = CONTACT, CONTACT + RATE
+    x = np.r_[Q, QD, QDD]
+    return np.asarray(_core.joint_moments(_core.Model(spec()), x, then)) - _core.joint_moments(
+        _core.Model(spec()), x, now
+    )
+
+
+def test_a_clock_that_is_off_moves_moments_by_how_fast_loads_change() -> None:
+    """Over time as live, and in each frame: a load passes faster than frames are sampled."""
+    subject, x = Systematic(calibrated(), Noise(), replace(NONE, clock=0.004, inertia=False)), np.r_[Q, QD, QDD]
+    time = 0.01 * np.arange(5)
+    data = xr.Dataset(
+        {
+            "state": (("time", "element"), np.tile(x, (5, 1))),
+            "state_sd": (("time", "element"), np.zeros((5, 30))),
+            "final_covariance": (("element", "element_"), np.zeros((30, 30))),
+            "foot_wrench": (("time", "foot", "component"), (CONTACT + time[:, None] * RATE)[:, None]),
+            "markers_measured": (("time", "marker", "axis"), np.zeros((5, 12, 3))),
+        }
+        | {f"{block}{end}": (("time", "coordinate"), np.zeros((5, 10))) for block in BLOCKS for end in ("", "_sd")},
+        coords={"time": time, "foot_segment": ("foot", ["shank"])},
+    )
+    recorded = subject.added_over_time(data, late=True)
+    np.testing.assert_allclose(recorded["moments_sd"], np.tile(0.004 * np.abs(by_rate()), (5, 1)), rtol=1e-9)
+    assert not recorded["speeds_sd"].any()
+    own = {block: np.zeros(10) for block in BLOCKS}
+    live = subject.added(own, x, np.zeros((30, 30)), CONTACT[None], ["shank"], late=True, wrench_rate=RATE[None])
+    np.testing.assert_allclose(live["moments"], recorded["moments_sd"][2], rtol=1e-9)
+
+
 def test_intensity_is_the_mean_square_of_accelerations_over_their_deviations_of_what_moves() -> None:
     acceleration, sd = np.array([[2.0, 3.0, 5.0], [0.0, 0.0, 1.0]]), np.array([[1.0, 3.0, 0.0], [1.0, 1.0, 0.0]])
     np.testing.assert_allclose(movement_intensity(acceleration, sd), [(4.0 + 1.0) / 2.0, 0.0])
@@ -282,12 +317,13 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     external = np.zeros((3, 6))
     external[2] = CONTACT
     parts = subject.parts(Q, QD, QDD, external)
+    parts["clock"] = {block: np.zeros(10) for block in BLOCKS} | {"moments": np.square(by_rate())}
     sizes = dict(zip(KINDS, SIZES, strict=True))
     intense = np.mean(QDD**2) / 4.0
     nothing = Systematic(calibrated(), Noise(), subject.sizes.scaled(0.0))
     for late, laws in ((True, OWN_LATE | {"speeds": (SPEEDS_STILL, MOVING)}), (False, OWN_AT_ONCE)):
-        both = subject.added(own, x, P, CONTACT[None], ["shank"], late=late)
-        alone = nothing.added(own, x, P, CONTACT[None], ["shank"], late=late)
+        both = subject.added(own, x, P, CONTACT[None], ["shank"], late=late, wrench_rate=RATE[None])
+        alone = nothing.added(own, x, P, CONTACT[None], ["shank"], late=late, wrench_rate=RATE[None])
         for block, (still, moving) in laws.items():
             factor = still + moving * intense
             added = sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)

@@ -179,6 +179,14 @@ class Systematic:
         T = _core.moment_jacobian(self._model, x, external)[: self._count, self._inertia]
         return np.asarray(((T @ covariance) * T).sum(axis=1))
 
+    def _by_clock(self, x: Array, wrench_rate: Array, segments: Sequence[str]) -> Array:
+        """(C,) variances of moments by loads that act a second later than they did; of wrenches that change by (F, 6) a
+        second. Moments are linear in them."""
+        load = self._external(wrench_rate, segments)
+        return np.square(
+            _core.joint_moments(self._model, x, load) - _core.joint_moments(self._model, x, np.zeros_like(load))
+        )
+
     def _labelled(self, q: Array, qd: Array, qdd: Array, moments: Array) -> dict[str, Array]:
         found = {}
         for name, values in zip(BLOCKS, (q, qd, qdd), strict=False):
@@ -203,10 +211,16 @@ class Systematic:
         chosen = _sampled(time)
         used = in_use(np.isfinite(values_of(data, "markers_measured")).any(axis=2), time)
         each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments, used[k]) for k in chosen]
-        return {
+        found = {
             kind: {block: _between(time, time[chosen], np.array([p[kind][block] for p in each])) for block in BLOCKS}
             for kind in (*KINDS, "inertia")
         }
+        # a load passes from foot to foot within a sample
+        rate = np.gradient(wrench, time, axis=0) if len(time) > 1 else np.zeros_like(wrench)
+        known = np.flatnonzero(np.isfinite(states).all(axis=1))
+        moments = found["clock"]["moments"]
+        moments[known] = [self._by_clock(states[k], rate[k], segments) for k in known]
+        return found
 
     def moments_moved(self, data: xr.Dataset, moved: Sequence[Array]) -> Array:
         """(T, C): what moments change by where coordinates, speeds and accelerations (T, C) are others by ``moved`` and
@@ -227,16 +241,28 @@ class Systematic:
             external[self._segments[name]] += values
         return external
 
-    def _at(self, x: Array, inertia: Array, wrench: Array, segments: Sequence[str], used: Flags | None = None) -> Parts:
-        """`parts` of a state (n,), and "inertia" of this covariance (I, I), with wrenches (F, 6) of contacts on these
-        segments."""
+    def _at(
+        self,
+        x: Array,
+        inertia: Array,
+        wrench: Array,
+        segments: Sequence[str],
+        used: Flags | None = None,
+        wrench_rate: Array | None = None,
+    ) -> Parts:
+        """`parts` of a state (n,), "inertia" of this covariance (I, I), and "clock", with wrenches (F, 6) of contacts
+        on these segments and by how much these change a second (F, 6)."""
         K = len(self._free)
         if not np.isfinite(x[: 3 * K]).all():
             return {kind: {b: np.full(self._count, np.nan) for b in BLOCKS} for kind in (*KINDS, "inertia")}
         external = self._external(wrench, segments)
         still = np.zeros(K)
-        by_inertia = self._labelled(still, still, still, self._by_inertia(x, inertia, external))
-        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external, used) | {"inertia": by_inertia}
+        by_inertia = self._by_inertia(x, inertia, external)
+        by_clock = np.zeros(self._count) if wrench_rate is None else self._by_clock(x, wrench_rate, segments)
+        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external, used) | {
+            "inertia": self._labelled(still, still, still, by_inertia),
+            "clock": self._labelled(still, still, still, by_clock),
+        }
 
     def added(
         self,
@@ -250,18 +276,20 @@ class Systematic:
         off_plates: bool = False,
         late: bool,
         used: Flags | None = None,
+        wrench_rate: Array | None = None,
     ) -> dict[str, Array]:
         """The filter's standard deviations of one frame (block -> (C,)) with these errors.
 
         Args:
             x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. sources, off_plates,
-                late: as of `reported`. used: as of `parts`.
+                late: as of `reported`. used: as of `parts`. wrench_rate: (F, 6) by how much the wrenches change a
+                second; not given: not at all.
         """
         inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
         own = {block: found[block] for block in BLOCKS}
         K = len(self._free)
         intense = movement_intensity(x[2 * K : 3 * K], own["accelerations"][self._free])
-        parts = self._at(x, inertia, wrench, segments, used)
+        parts = self._at(x, inertia, wrench, segments, used, wrench_rate)
         moved = self.moved_m(x)
         return reported(
             self.sizes, self._variance_scale, own, parts, intense, moved, sources, off_plates=off_plates, late=late
