@@ -43,9 +43,6 @@ from dynakin.settings.subject import CarriedLoad
 Array = npt.NDArray[np.float64]
 Feet = Callable[[CalibratedModel], ContactLoads | None]
 
-CLOCK_SHARE = 0.6
-"""Part of the frames in which the plates must measure the whole for their delay to be estimated."""
-
 
 class Tracked(NamedTuple):
     """A recording's estimate, and the tracker as the last frame left it."""
@@ -242,7 +239,7 @@ class Estimator:
             raise RecordingError(f"{recording.path or recording.name}: {problem}")
         calibrated = self.calibrate(recording, static=static)
         markers, wrench, ground = self._measured(recording, calibrated)
-        tracker = Tracker(calibrated, self._noise_for(ground, calibrated), self.estimate)
+        tracker = Tracker(calibrated, self.noise, self.estimate)
         calibrated = tracker.calibrated
         contacts = None
         if feet is not None:
@@ -294,7 +291,7 @@ class Estimator:
                 arrays = arrays if skin is None else skin.put_back(arrays)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        config = self.settings() | {"lag_s": lag_s, "ground_reasons": list(ground.reasons)}
+        config = self.settings() | {"lag_s": lag_s, "ground_reasons": list(ground.reasons), "behind_s": ground.behind_s}
         unsought = " No further delay of the plates is sought, because a wrong mass looks like one."
         doubt = [ready.doubt + unsought] if ready.doubt else clock if ground.usable else []
         config["noise_used"] = tracker.noise.scales()
@@ -311,14 +308,6 @@ class Estimator:
             tracker.noise, on_feet, ready.undeclared(on_feet), tracker.systematic, found_low_pass(recording),
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)
-
-    def _noise_for(self, ground: Ground, calibrated: CalibratedModel) -> Noise:
-        """Without a delay of the plates where these measure the whole too seldom, because priors follow the markers'
-        clock, and where much of the body is not marked, because what it does late looks like one."""
-        often = ground.loads is None or ground.loads.total_known.mean() >= CLOCK_SHARE
-        if often and not calibrated.unseen_kg:
-            return self.noise
-        return self.noise.changed(plate_delay_sd_s=0.0)
 
     def _measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array, Ground]:
         markers, wrench = recording_arrays(recording, calibrated, gaps=self.noise.recover)
