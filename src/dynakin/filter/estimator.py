@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.filter.adapt import CALIBRATED_S, Trial, calibrated_noise
+from dynakin.filter.adapt import CALIBRATED_S, Trial, calibrated_noise, frames_that_show
 from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
@@ -266,20 +266,23 @@ class Estimator:
             scaled = late is None and calibrated.plan is None and may_follow(calibrated, ready.tracker.noise)
             once = not (adapt or scaled)  # a first run shows nothing that the next is to know
             frames, ways = recording.n_frames, 2 if late is None else 1
+            # of a body that is fixed nowhere it shows the noise alone: a part of the recording is enough
+            shown = frames_that_show(recording.time, markers) if adapt and calibrated.feet and not scaled else frames
             again = min(frames, round(CALIBRATED_S * recording.rate)) if adapt else 0
-            shares = (ways * frames, 0, 0) if once else (frames, again, ways * frames)
+            shares = (ways * frames, 0, 0) if once else (shown, again, ways * frames)
             there, calibrating, back = _shares(progress, shares)
             passes = 0 if ready.doubt else PASSES
 
             def first(own: Tracker, *trial: Any) -> dict[str, Array]:
                 return own.run_late_arrays(late, *trial) if once else own.run_arrays(*trial, state_only=True)
 
+            time, taken, moved, loads = Trial(recording.time, markers, ready.wrench, on_feet).first(shown)
             tracker, arrays, shift, clock = run_in_step(
-                ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes, first
+                ready.tracker.fresh(), time, taken, moved, there, loads, passes, first
             )
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
-            trial = Trial(recording.time, markers, wrench, on_feet)
+            trial = Trial(recording.time, markers, wrench, on_feet).first(shown)
             found = calibrated_noise(tracker, arrays, trial, late=not lag_s, progress=calibrating) if adapt else None
             if adapt and found is None:
                 notes.append("Too few frames are followed to calibrate the noise on them: it is as declared.")
@@ -293,7 +296,7 @@ class Estimator:
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"lag_s": lag_s, "ground_reasons": list(ground.reasons), "behind_s": ground.behind_s}
         unsought = " No further delay of the plates is sought, because a wrong mass looks like one."
-        doubt = [ready.doubt + unsought] if ready.doubt else clock if ground.usable else []
+        doubt = [ready.doubt + unsought * (not calibrated.feet)] if ready.doubt else clock if ground.usable else []
         config["noise_used"] = tracker.noise.scales()
         notes += [*doubt, *ready.unsmoothed]
         plates = [plate.name for plate in recording.plates]
