@@ -33,14 +33,15 @@ CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
 RATE = np.array([-900.0, 4000.0, 300.0, 200.0, 100.0, 700.0])
 """By how much the contact changes, N and N m a second."""
-SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.015, 0.004)
+SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.008, 0.3, 0.015, 0.004)
 MOVING, OFF_PLATES = 0.1, 0.2
 NONE = Sizes(*np.zeros(len(SIZES)), placed=np.inf, own_speeds=MOVING, own_off_plates=OFF_PLATES)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
-def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS) -> _core.ModelSpec:
-    """Pelvis, thigh and shank; the hip and the knee misplaced on all their bones, the knee's axis turned on both."""
+def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS, roll: float | None = None) -> _core.ModelSpec:
+    """Pelvis, thigh and shank; the hip and the knee misplaced on all their bones, the knee's axis turned on both; the
+    knee's centre moves forward by ``roll`` m a radian, where it does."""
     names = ["tx", "ty", "tz", "tilt", "list", "rotation", "flexion", "adduction", "turn", "knee"]
     root = [_core.AxisSpec(n, "translation", e) for n, e in zip(names[:3], (X, Y, Z), strict=True)]
     root += [_core.AxisSpec(n, "rotation", e) for n, e in zip(names[3:6], (Z, X, Y), strict=True)]
@@ -50,6 +51,7 @@ def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS) -> _core
         "thigh": np.array([8.0, 0.1, -1.6, 0.1, 0.5, 0.05, 0.5, 0.0, 0.0, 0.0]),
         "shank": np.array([4.0, 0.0, -0.8, 0.0, 0.3, 0.02, 0.3, 0.0, 0.0, 0.0]),
     }
+    rolls = [] if roll is None else [_core.AxisSpec("knee", "translation", X, scale="roll")]
     segments = [
         _core.SegmentSpec("pelvis", axes=root, inertia=inertia["pelvis"]),
         _core.SegmentSpec(
@@ -59,7 +61,7 @@ def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS) -> _core
             "shank",
             "thigh",
             translation=np.array([0.0, -0.4, 0.0]) - hip + knee,
-            axes=[_core.AxisSpec("knee", "rotation", turned @ Z)],
+            axes=[*rolls, _core.AxisSpec("knee", "rotation", turned @ Z)],
             inertia=inertia["shank"],
         ),
     ]
@@ -69,7 +71,8 @@ def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS) -> _core
         for s, centre in (("pelvis", np.zeros(3)), ("thigh", -0.2 * Y), ("shank", -0.2 * Y))
         for k in range(4)
     ]
-    return _core.ModelSpec("leg", [_core.CoordinateSpec(n) for n in names], [], segments, markers)
+    lengths = [] if roll is None else [_core.ParameterSpec("roll", roll, False)]
+    return _core.ModelSpec("leg", [_core.CoordinateSpec(n) for n in names], lengths, segments, markers)
 
 
 def changed(**errors: Array) -> _core.Model:
@@ -265,6 +268,27 @@ def test_a_centre_of_mass_off_its_place_is_that_of_segments_that_are_changed() -
     parts = systematic().parts(Q, QD, QDD, external)["mass_centre"]
     np.testing.assert_allclose(np.sqrt(parts["moments"]), np.sqrt(expected), rtol=1e-6)
     assert not any(parts[block].any() for block in ("coordinates", "speeds", "accelerations"))
+
+
+def test_a_knee_that_rolls_otherwise_errs_as_one_that_is_changed() -> None:
+    """No angle errs where it is straight."""
+    person = calibrated()
+    person.spec = spec(roll=0.0)
+    person.spec.parameters = [_core.ParameterSpec("roll", 0.0, True)]
+    person.names, person.x0 = tuple(_core.Model(person.spec).layout.names), _core.Model(person.spec).initial_state()
+    external = np.zeros((3, 6))
+    external[2] = CONTACT
+    subject = Systematic(person, Noise())
+    parts = subject.parts(Q, QD, QDD, external)["roll"]
+    size = 1e-5
+    for values, block in zip(effects(_core.Model(spec(roll=size))), BLOCKS, strict=True):
+        expected = np.abs(values / size)
+        np.testing.assert_allclose(
+            np.sqrt(parts[block]), expected, rtol=0.02, atol=2e-3 * expected.max(), err_msg=block
+        )
+    still = np.zeros(10)
+    straight = subject.parts(REFERENCE, still, still, external)["roll"]
+    assert straight["coordinates"].max() < 1e-18
 
 
 def by_rate() -> Array:

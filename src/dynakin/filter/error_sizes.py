@@ -11,7 +11,7 @@ from dynakin.filter.joint_errors import Kind
 from dynakin.model.calibration.calibrated import CalibratedModel
 
 OF_JOINTS = get_args(Kind)
-KINDS = (*OF_JOINTS, "skin", "mass_centre", "clock")
+KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "clock")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
 CENTRES = ("hinge_centre", "ball_centre")
 """What goes by how far markers have moved, too."""
@@ -26,6 +26,7 @@ class Sizes:
         hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar) or
             three.
         root: rad, of the turn of the pelvis' frame in the pelvis.
+        roll: m/rad, of how far the centre of a joint moves with its angle (knees'), where the model has that.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
         mass_centre: m, of the centre of mass of each segment off where the model has it.
         clock: s, of the plates' clock off the markers': less than can be found in a walk.
@@ -46,6 +47,7 @@ class Sizes:
     pair_axes: float
     ball_axes: float
     root: float
+    roll: float
     skin: float
     mass_centre: float
     clock: float
@@ -60,13 +62,14 @@ class Sizes:
 
 
 LANDMARKS = Sizes(
-    hinge_centre=0.0042,
-    ball_centre=0.005,
+    hinge_centre=0.0025,
+    ball_centre=0.0035,
     hinge_axes=np.radians(2.0),
     pair_axes=np.radians(3.0),
     ball_axes=np.radians(0.4),
     root=np.radians(0.5),
-    skin=0.12,
+    roll=0.007,
+    skin=0.09,
     mass_centre=0.02,
     clock=0.002,
     placed=np.inf,
@@ -87,6 +90,7 @@ SCALED = Sizes(
     pair_axes=np.radians(1.3),
     ball_axes=np.radians(0.8),
     root=np.radians(0.9),
+    roll=0.0,
     skin=0.08,
     mass_centre=0.003,
     clock=0.002,

@@ -89,10 +89,12 @@ class Systematic:
         self._R0 = _core.segment_poses(self._errors.model, x)[0]
         self._D0 = self._displacements(_core.marker_jacobian(self._errors.model, x))
         self._D0[:, [kind == "root" for kind in self._errors.kinds]] = 0.0
-        gain, N = self._gain(x)
-        self._B0 = gain @ N
-        self._segments = {name: k for k, name in enumerate(segments)}
         self._model = _core.Model(spec)
+        self._constants = np.array(calibrated.x0)
+        self._rolls = [first[name] for name in rolls(spec) if name in first]
+        gain, N = self._gain(x)
+        self._B0 = gain @ np.hstack([N, self._rolled(self._reference)])
+        self._segments = {name: k for k, name in enumerate(segments)}
         self._variance_scale = noise.variance_scale
         self._inertia = [
             k for k, name in enumerate(calibrated.names) if self.sizes.inertia and name.startswith("inertia/")
@@ -126,21 +128,22 @@ class Systematic:
         errors = self._errors
         gains, effects = [], []
         for h in (-_STEP_S, 0.0, _STEP_S):
-            x = errors.state(q + h * qd + 0.5 * h * h * qdd, qd, qdd)
-            gain, N = self._gain(x, used)
+            moved = q + h * qd + 0.5 * h * h * qdd
+            gain, N = self._gain(errors.state(moved, qd, qdd), used)
             gains.append(gain)
-            effects.append(gain @ N)
+            effects.append(gain @ np.hstack([N, self._rolled(moved)]))
         G, Gd, Gdd = _differences(gains)
         B, Bd, Bdd = _differences(effects)
         x = errors.state(q, qd, qdd)
         T = _core.moment_jacobian(errors.model, x, external)[: self._count]
         size = len(errors.free) + len(errors.placed)
         Tq, Tv, Ta = (T[:, k * size + errors.free] for k in range(3))
-        direct = T[:, errors.placed] @ errors.sources
+        direct = np.hstack([T[:, errors.placed] @ errors.sources, self._rolled_moments(q, qd, qdd, external)])
         moved = Tq @ B + Tv @ Bd + Ta @ Bdd + direct
         found: Parts = {}
-        for kind in OF_JOINTS:
-            chosen = [k for k, own in enumerate(errors.kinds) if own == kind]
+        kinds = (*errors.kinds, *("roll" for _ in self._rolls))
+        for kind in (*OF_JOINTS, "roll"):
+            chosen = [k for k, own in enumerate(kinds) if own == kind]
             outputs = (B - self._B0, Bd, Bdd, moved)  # of angles what changes with the posture: a zero is a definition
             found[kind] = self._labelled(*(np.square(values[:, chosen]).sum(axis=1) for values in outputs))
         found["skin"] = self._labelled(*self._skin(q, qd, qdd, (G, Gd, Gdd), (Tq, Tv, Ta)))
@@ -148,6 +151,22 @@ class Systematic:
         displaced = T[:, errors.first_moments] * errors.masses
         found["mass_centre"] = self._labelled(still, still, still, np.square(displaced).sum(axis=1))
         return found
+
+    def _rolled(self, q: Array) -> Array:
+        """(3 M, L): what joints' centres that move with their angle do to the markers, a m/rad (`rolls`)."""
+        if not self._rolls:
+            return np.zeros((len(self._root_weight), 0))
+        x = self._constants.copy()
+        x[: len(q)] = q
+        return np.asarray(_core.marker_jacobian(self._model, x)[:, self._rolls])
+
+    def _rolled_moments(self, q: Array, qd: Array, qdd: Array, external: Array | None) -> Array:
+        """(C, L): what they do to moments."""
+        if not self._rolls:
+            return np.zeros((self._count, 0))
+        x = self._constants.copy()
+        x[: 3 * len(q)] = np.concatenate([q, qd, qdd])
+        return np.asarray(_core.moment_jacobian(self._model, x, external)[: self._count, self._rolls])
 
     def _skin(
         self, q: Array, qd: Array, qdd: Array, gains: tuple[Array, Array, Array], T: tuple[Array, Array, Array]
@@ -394,6 +413,12 @@ def neutral(calibrated: CalibratedModel) -> Array:
     K = len(free)
     q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
     return q
+
+
+def rolls(spec: _core.ModelSpec) -> list[str]:
+    """Lengths by which the centre of a joint moves with its angle, as elements of the state."""
+    axes = [axis for segment in spec.segments for axis in segment.axes if axis.kind == "translation"]
+    return [f"length/{scale}" for scale in dict.fromkeys(a.scale for a in axes if a.coordinate and a.scale)]
 
 
 def drives(spec: _core.ModelSpec, free: npt.NDArray[np.intp]) -> Array:
