@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.filter.adapt import LATE_SHARE, LEAST_FRAMES, Trial, calibrated_noise, nis_per_row
+from dynakin.filter.adapt import LATE_SHARE, LEAST_FRAMES, Trial, calibrated_noise, frames_that_show, nis_per_row
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.noise import joint_groups
@@ -175,3 +175,15 @@ def test_frames_in_which_limbs_are_astray_say_nothing_of_the_noise() -> None:
 def test_too_few_frames_leave_the_noise_as_declared() -> None:
     recording = standing(0.001).window(0.0, 0.3 + 0.005 * LEAST_FRAMES)
     assert planar(Noise(adapt=True)).run(recording).config["noise_used"]["variance_scale"] == 1.0
+
+
+def test_as_much_of_a_recording_is_looked_at_as_shows_its_movement() -> None:
+    time = np.arange(4000) / 100.0
+    always = np.sin(2.0 * np.pi * time)[:, None, None] * np.ones((1, 3, 3))
+    assert frames_that_show(time[:900], always[:900]) == 900
+    assert frames_that_show(time, always) == pytest.approx(1000, abs=20)
+    late = np.where(time[:, None, None] < 20.0, 0.0, always)
+    assert frames_that_show(time, late) == pytest.approx(3333, abs=50)  # (t - 20) / t is 0.8 of a half
+    late[:, 1] = np.nan
+    assert frames_that_show(time, late) == pytest.approx(3333, abs=50)
+    assert frames_that_show(time, np.zeros_like(late)) == pytest.approx(1000, abs=20)

@@ -64,6 +64,22 @@ def test_a_session_counts_measured_moments_more_once_a_foot_has_stood_off_the_pl
         assert (after[True][knee] > before[True][knee]) == off_plates
 
 
+def test_moments_are_less_sure_by_the_clock_while_loads_change_late_as_at_once() -> None:
+    recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.2)
+    model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
+    live = Estimator(model, presets.default()).start(recording, lag_s=0.04)
+    for sample, part in zip(_samples(recording), _frames(_feet(recording, live)), strict=True):
+        live.step(sample, part)
+    assert live.systematic is not None
+    for late in (True, False):
+        with_clock = live.deviations(delayed=late)["moments"].values
+        live.systematic.sizes = replace(live.systematic.sizes, clock=0.0)
+        without = live.deviations(delayed=late)["moments"].values
+        live.systematic.sizes = replace(live.systematic.sizes, clock=0.002)
+        ankle = [coordinate.name for coordinate in live.calibrated.spec.coordinates].index("ankle_angle_l")
+        assert with_clock[ankle] > without[ankle] > 0.0
+
+
 def test_a_limb_that_nobody_sees_is_absent_from_the_fifth_of_a_second_on() -> None:
     recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.4)
     live = Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))).start(recording)

@@ -31,14 +31,17 @@ QD = np.array([0.4, -0.1, 0.2, 0.5, -0.3, 0.6, 1.2, 0.4, -0.7, -1.5])
 QDD = np.array([1.0, 0.5, -1.0, 2.0, 1.0, -2.0, 5.0, -3.0, 2.0, 6.0])
 CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
-SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.015)
+RATE = np.array([-900.0, 4000.0, 300.0, 200.0, 100.0, 700.0])
+"""By how much the contact changes, N and N m a second."""
+SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.008, 0.3, 0.015, 0.004)
 MOVING, OFF_PLATES = 0.1, 0.2
 NONE = Sizes(*np.zeros(len(SIZES)), placed=np.inf, own_speeds=MOVING, own_off_plates=OFF_PLATES)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
-def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS) -> _core.ModelSpec:
-    """Pelvis, thigh and shank; the hip and the knee misplaced on all their bones, the knee's axis turned on both."""
+def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS, roll: float | None = None) -> _core.ModelSpec:
+    """Pelvis, thigh and shank; the hip and the knee misplaced on all their bones, the knee's axis turned on both; the
+    knee's centre moves forward by ``roll`` m a radian, where it does."""
     names = ["tx", "ty", "tz", "tilt", "list", "rotation", "flexion", "adduction", "turn", "knee"]
     root = [_core.AxisSpec(n, "translation", e) for n, e in zip(names[:3], (X, Y, Z), strict=True)]
     root += [_core.AxisSpec(n, "rotation", e) for n, e in zip(names[3:6], (Z, X, Y), strict=True)]
@@ -48,6 +51,7 @@ def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS) -> _core
         "thigh": np.array([8.0, 0.1, -1.6, 0.1, 0.5, 0.05, 0.5, 0.0, 0.0, 0.0]),
         "shank": np.array([4.0, 0.0, -0.8, 0.0, 0.3, 0.02, 0.3, 0.0, 0.0, 0.0]),
     }
+    rolls = [] if roll is None else [_core.AxisSpec("knee", "translation", X, scale="roll")]
     segments = [
         _core.SegmentSpec("pelvis", axes=root, inertia=inertia["pelvis"]),
         _core.SegmentSpec(
@@ -57,7 +61,7 @@ def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS) -> _core
             "shank",
             "thigh",
             translation=np.array([0.0, -0.4, 0.0]) - hip + knee,
-            axes=[_core.AxisSpec("knee", "rotation", turned @ Z)],
+            axes=[*rolls, _core.AxisSpec("knee", "rotation", turned @ Z)],
             inertia=inertia["shank"],
         ),
     ]
@@ -67,7 +71,8 @@ def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS) -> _core
         for s, centre in (("pelvis", np.zeros(3)), ("thigh", -0.2 * Y), ("shank", -0.2 * Y))
         for k in range(4)
     ]
-    return _core.ModelSpec("leg", [_core.CoordinateSpec(n) for n in names], [], segments, markers)
+    lengths = [] if roll is None else [_core.ParameterSpec("roll", roll, False)]
+    return _core.ModelSpec("leg", [_core.CoordinateSpec(n) for n in names], lengths, segments, markers)
 
 
 def changed(**errors: Array) -> _core.Model:
@@ -265,6 +270,60 @@ def test_a_centre_of_mass_off_its_place_is_that_of_segments_that_are_changed() -
     assert not any(parts[block].any() for block in ("coordinates", "speeds", "accelerations"))
 
 
+def test_a_knee_that_rolls_otherwise_errs_as_one_that_is_changed() -> None:
+    """No angle errs where it is straight."""
+    person = calibrated()
+    person.spec = spec(roll=0.0)
+    person.spec.parameters = [_core.ParameterSpec("roll", 0.0, True)]
+    person.names, person.x0 = tuple(_core.Model(person.spec).layout.names), _core.Model(person.spec).initial_state()
+    external = np.zeros((3, 6))
+    external[2] = CONTACT
+    subject = Systematic(person, Noise())
+    parts = subject.parts(Q, QD, QDD, external)["roll"]
+    size = 1e-5
+    for values, block in zip(effects(_core.Model(spec(roll=size))), BLOCKS, strict=True):
+        expected = np.abs(values / size)
+        np.testing.assert_allclose(
+            np.sqrt(parts[block]), expected, rtol=0.02, atol=2e-3 * expected.max(), err_msg=block
+        )
+    still = np.zeros(10)
+    straight = subject.parts(REFERENCE, still, still, external)["roll"]
+    assert straight["coordinates"].max() < 1e-18
+
+
+def by_rate() -> Array:
+    """(C,) what moments change by a second, where the motion stays and the contact goes on changing."""
+    now, then = np.zeros((2, 3, 6))
+    now[2], then[2] = CONTACT, CONTACT + RATE
+    x = np.r_[Q, QD, QDD]
+    return np.asarray(_core.joint_moments(_core.Model(spec()), x, then)) - _core.joint_moments(
+        _core.Model(spec()), x, now
+    )
+
+
+def test_a_clock_that_is_off_moves_moments_by_how_fast_loads_change() -> None:
+    """Over time as live, and in each frame: a load passes faster than frames are sampled."""
+    subject, x = Systematic(calibrated(), Noise(), replace(NONE, clock=0.004, inertia=False)), np.r_[Q, QD, QDD]
+    time = 0.01 * np.arange(5)
+    data = xr.Dataset(
+        {
+            "state": (("time", "element"), np.tile(x, (5, 1))),
+            "state_sd": (("time", "element"), np.zeros((5, 30))),
+            "final_covariance": (("element", "element_"), np.zeros((30, 30))),
+            "foot_wrench": (("time", "foot", "component"), (CONTACT + time[:, None] * RATE)[:, None]),
+            "markers_measured": (("time", "marker", "axis"), np.zeros((5, 12, 3))),
+        }
+        | {f"{block}{end}": (("time", "coordinate"), np.zeros((5, 10))) for block in BLOCKS for end in ("", "_sd")},
+        coords={"time": time, "foot_segment": ("foot", ["shank"])},
+    )
+    recorded = subject.added_over_time(data, late=True)
+    np.testing.assert_allclose(recorded["moments_sd"], np.tile(0.004 * np.abs(by_rate()), (5, 1)), rtol=1e-9)
+    assert not recorded["speeds_sd"].any()
+    own = {block: np.zeros(10) for block in BLOCKS}
+    live = subject.added(own, x, np.zeros((30, 30)), CONTACT[None], ["shank"], late=True, wrench_rate=RATE[None])
+    np.testing.assert_allclose(live["moments"], recorded["moments_sd"][2], rtol=1e-9)
+
+
 def test_intensity_is_the_mean_square_of_accelerations_over_their_deviations_of_what_moves() -> None:
     acceleration, sd = np.array([[2.0, 3.0, 5.0], [0.0, 0.0, 1.0]]), np.array([[1.0, 3.0, 0.0], [1.0, 1.0, 0.0]])
     np.testing.assert_allclose(movement_intensity(acceleration, sd), [(4.0 + 1.0) / 2.0, 0.0])
@@ -282,12 +341,13 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     external = np.zeros((3, 6))
     external[2] = CONTACT
     parts = subject.parts(Q, QD, QDD, external)
+    parts["clock"] = {block: np.zeros(10) for block in BLOCKS} | {"moments": np.square(by_rate())}
     sizes = dict(zip(KINDS, SIZES, strict=True))
     intense = np.mean(QDD**2) / 4.0
     nothing = Systematic(calibrated(), Noise(), subject.sizes.scaled(0.0))
     for late, laws in ((True, OWN_LATE | {"speeds": (SPEEDS_STILL, MOVING)}), (False, OWN_AT_ONCE)):
-        both = subject.added(own, x, P, CONTACT[None], ["shank"], late=late)
-        alone = nothing.added(own, x, P, CONTACT[None], ["shank"], late=late)
+        both = subject.added(own, x, P, CONTACT[None], ["shank"], late=late, wrench_rate=RATE[None])
+        alone = nothing.added(own, x, P, CONTACT[None], ["shank"], late=late, wrench_rate=RATE[None])
         for block, (still, moving) in laws.items():
             factor = still + moving * intense
             added = sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)

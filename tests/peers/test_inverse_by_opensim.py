@@ -11,11 +11,11 @@ import pytest
 from dynakin import read
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.prepared import Prepared
+from dynakin.model.calibration.inverse_kinematics import inverse_kinematics
 from dynakin.model.definition import load_model
 from dynakin.model.spec import free_names
 from dynakin.settings.model import OpenSimOptions
 from dynakin.validation.reference.inverse_dynamics import RigidMotion, rigid_motions
-from dynakin.validation.reference.inverse_kinematics import inverse_kinematics
 
 opensim: Any = pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
 pytestmark = pytest.mark.peers

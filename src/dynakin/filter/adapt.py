@@ -31,6 +31,11 @@ Flags = npt.NDArray[np.bool_]
 CALIBRATED_S = 4.0
 """How long somebody is followed of what is filtered again with other jerk densities, from the recording's start: 3 and
 10 s give factors within 2 % of each other."""
+SHOWN_S = 10.0
+"""The first run, which shows how large innovations are, goes over so much of the recording at least,"""
+MOVES, MOVED_S = 0.8, 0.1
+"""and over as much more as it takes until markers have moved by so much of what they do in all of it (mean square of
+their way in so many seconds): who stands for a while shows little."""
 SETTLING_S = 0.3
 """Left out of it: the first frames' covariances are the priors'."""
 LEAST_FRAMES = 25
@@ -59,6 +64,20 @@ class Trial(NamedTuple):
         """Its first frames."""
         contacts = self.contacts and self.contacts.first(frames)
         return Trial(self.time[:frames], self.markers[:frames], self.wrench[:frames], contacts)
+
+
+def frames_that_show(time: Array, markers: Array) -> int:
+    """How many first frames a run has to see for its noise to be that of the recording: (T,) s, (T, M, 3) m."""
+    least = int(np.searchsorted(time, time[0] + SHOWN_S, side="right"))
+    if least >= len(time):
+        return len(time)
+    step = max(int(np.searchsorted(time, time[0] + MOVED_S)), 1)
+    way = np.square(markers[step:] - markers[:-step]).sum(axis=2)
+    seen = np.isfinite(way)
+    moved, count = (np.cumsum(each.sum(axis=1)) for each in (np.where(seen, way, 0.0), seen))
+    enough = moved * count[-1] >= MOVES * moved[-1] * count
+    enough[: least - step] = False
+    return int(np.argmax(enough)) + step + 1  # of all frames it is so
 
 
 def calibrated_noise(

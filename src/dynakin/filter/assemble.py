@@ -106,7 +106,7 @@ def assemble(
     )
     constants = [initial.names.index(p.name) for p in parameters if p.estimated]
     data["state_sd"][:, constants] *= declared[constants]  # one deviation of a constant, wherever it is read
-    config = {key: value for key, value in config.items() if key != "ground_reasons"} | {
+    config = {key: value for key, value in config.items() if key not in ("ground_reasons", "behind_s")} | {
         "mass_kg": initial.mass_kg,
         "height_m": initial.height_m,
         "side": initial.side,
@@ -118,6 +118,7 @@ def assemble(
             "forward": initial.ground.forward.tolist(),
             "origin_m": initial.ground.origin_L.tolist(),
             "reasons": reasons,
+            "plates_behind_s": config.get("behind_s", 0.0),
         },
     }
     events = events_of(whole, parameters, initial, unseen_limit(used))  # by what the filter itself believes

@@ -11,7 +11,7 @@ from dynakin.filter.joint_errors import Kind
 from dynakin.model.calibration.calibrated import CalibratedModel
 
 OF_JOINTS = get_args(Kind)
-KINDS = (*OF_JOINTS, "skin", "mass_centre")
+KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "clock")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
 CENTRES = ("hinge_centre", "ball_centre")
 """What goes by how far markers have moved, too."""
@@ -26,8 +26,10 @@ class Sizes:
         hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar) or
             three.
         root: rad, of the turn of the pelvis' frame in the pelvis.
+        roll: m/rad, of how far the centre of a joint moves with its angle (knees'), where the model has that.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
         mass_centre: m, of the centre of mass of each segment off where the model has it.
+        clock: s, of the plates' clock off the markers': less than can be found in a walk.
         placed: m, how far (mean) markers may be found from where the model has them, for centres of joints to be as
             sure as said: of a model that was scaled worse to the person both are off, in proportion.
         own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
@@ -45,27 +47,31 @@ class Sizes:
     pair_axes: float
     ball_axes: float
     root: float
+    roll: float
     skin: float
     mass_centre: float
+    clock: float
     placed: float
     own_speeds: float
     own_off_plates: float
     inertia: bool = True
 
     def scaled(self, factor: float) -> Sizes:
-        """The errors of joints, skin and centres of mass times a factor."""
+        """The errors of joints, skin, centres of mass and clock times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
 
 
 LANDMARKS = Sizes(
-    hinge_centre=0.0042,
-    ball_centre=0.005,
+    hinge_centre=0.0025,
+    ball_centre=0.0035,
     hinge_axes=np.radians(2.0),
     pair_axes=np.radians(3.0),
     ball_axes=np.radians(0.4),
     root=np.radians(0.5),
-    skin=0.12,
+    roll=0.007,
+    skin=0.09,
     mass_centre=0.02,
+    clock=0.002,
     placed=np.inf,
     own_speeds=0.17,
     own_off_plates=0.14,
@@ -84,8 +90,10 @@ SCALED = Sizes(
     pair_axes=np.radians(1.3),
     ball_axes=np.radians(0.8),
     root=np.radians(0.9),
+    roll=0.0,
     skin=0.08,
     mass_centre=0.003,
+    clock=0.002,
     placed=0.005,
     own_speeds=0.06,
     own_off_plates=0.034,

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.filter.adapt import CALIBRATED_S, Trial, calibrated_noise
+from dynakin.filter.adapt import CALIBRATED_S, Trial, calibrated_noise, frames_that_show
 from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
@@ -43,9 +43,6 @@ from dynakin.settings.subject import CarriedLoad
 
 Array = npt.NDArray[np.float64]
 Feet = Callable[[CalibratedModel], ContactLoads | None]
-
-CLOCK_SHARE = 0.6
-"""Part of the frames in which the plates must measure the whole for their delay to be estimated."""
 
 
 class Tracked(NamedTuple):
@@ -243,7 +240,7 @@ class Estimator:
             raise RecordingError(f"{recording.path or recording.name}: {problem}")
         calibrated = self.calibrate(recording, static=static)
         markers, wrench, ground = self._measured(recording, calibrated)
-        tracker = Tracker(calibrated, self._noise_for(ground, calibrated), self.estimate)
+        tracker = Tracker(calibrated, self.noise, self.estimate)
         calibrated = tracker.calibrated
         contacts = None
         if feet is not None:
@@ -270,20 +267,23 @@ class Estimator:
             scaled = late is None and calibrated.plan is None and may_follow(calibrated, ready.tracker.noise)
             once = not (adapt or scaled)  # a first run shows nothing that the next is to know
             frames, ways = recording.n_frames, 2 if late is None else 1
+            # of a body that is fixed nowhere it shows the noise alone: a part of the recording is enough
+            shown = frames_that_show(recording.time, markers) if adapt and calibrated.feet and not scaled else frames
             again = min(frames, round(CALIBRATED_S * recording.rate)) if adapt else 0
-            shares = (ways * frames, 0, 0) if once else (frames, again, ways * frames)
+            shares = (ways * frames, 0, 0) if once else (shown, again, ways * frames)
             there, calibrating, back = _shares(progress, shares)
             passes = 0 if ready.doubt else PASSES
 
             def first(own: Tracker, *trial: Any) -> dict[str, Array]:
                 return own.run_late_arrays(late, *trial) if once else own.run_arrays(*trial, state_only=True)
 
+            time, taken, moved, loads = Trial(recording.time, markers, ready.wrench, on_feet).first(shown)
             tracker, arrays, shift, clock = run_in_step(
-                ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes, first
+                ready.tracker.fresh(), time, taken, moved, there, loads, passes, first
             )
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
-            trial = Trial(recording.time, markers, wrench, on_feet)
+            trial = Trial(recording.time, markers, wrench, on_feet).first(shown)
             found = calibrated_noise(tracker, arrays, trial, late=not lag_s, progress=calibrating) if adapt else None
             if adapt and found is None:
                 notes.append(
@@ -297,11 +297,12 @@ class Estimator:
                 arrays = arrays if skin is None else skin.put_back(arrays)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        config = self.settings() | {"lag_s": lag_s, "ground_reasons": [reason.text for reason in ground.reasons]}
-        unsought = " No further delay of the plates is sought, because a wrong mass looks like one."
-        doubt = (
-            [replace(ready.doubt, text=ready.doubt.text + unsought)] if ready.doubt else clock if ground.usable else []
-        )
+        reasons = [reason.text for reason in ground.reasons]
+        config = self.settings() | {"lag_s": lag_s, "ground_reasons": reasons, "behind_s": ground.behind_s}
+        doubt = clock if ground.usable else []
+        if ready.doubt:
+            unsought = " No further delay of the plates is sought, because a wrong mass looks like one."
+            doubt = [replace(ready.doubt, text=ready.doubt.text + unsought * (not calibrated.feet))]
         config["noise_used"] = tracker.noise.scales()
         notes += [*doubt, *ready.unsmoothed]
         plates = [plate.name for plate in recording.plates]
@@ -316,14 +317,6 @@ class Estimator:
             tracker.noise, on_feet, ready.undeclared(on_feet), tracker.systematic, found_low_pass(recording),
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)
-
-    def _noise_for(self, ground: Ground, calibrated: CalibratedModel) -> Noise:
-        """Without a delay of the plates where these measure the whole too seldom, because priors follow the markers'
-        clock, and where much of the body is not marked, because what it does late looks like one."""
-        often = ground.loads is None or ground.loads.total_known.mean() >= CLOCK_SHARE
-        if often and not calibrated.unseen_kg:
-            return self.noise
-        return self.noise.changed(plate_delay_sd_s=0.0)
 
     def _measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array, Ground]:
         markers, wrench = recording_arrays(recording, calibrated, gaps=self.noise.recover)

@@ -17,9 +17,6 @@ _INERTIA_UNITS = {"mass": "kg", "mx": "kg m", "my": "kg m", "mz": "kg m"}
 _NEAR = 0.1
 """Standard deviations from its bound within which an amount that the movement finds (a length that starts at 0) is on
 it: what the data press there, the noise of the last frame may have moved off by as little."""
-DELAY_UNSEEN_S = 0.006
-"""Standard deviation of a plates' delay that jerk and inertia take up, of a body that is fixed nowhere: walks of
-`truth3d` (seeds 11, 12) say 1 to 7 ms ahead, to 3 to 4 ms, of plates that are 2 ms late."""
 _PLATE_UNITS = {"delay": "s", "fx": "N", "fy": "N", "fz": "N"}
 
 
@@ -45,8 +42,6 @@ def parameters_of(
         amount = kind == "length" and initial.x0[k] == 0.0
         # the prior of a correction to a measured place is what skin hides of that place
         unseen = skin.get(owner, 0.0) if kind == "length" and not amount else 0.0
-        if kind == "plates" and owner == "delay" and initial.feet:
-            unseen = DELAY_UNSEEN_S
         within = min(state[k] - initial.lower[k], initial.upper[k] - state[k])
         found.append(
             Parameter(

@@ -27,8 +27,10 @@ Flags = npt.NDArray[np.bool_]
 
 LONGEST_S, STEP_S = 0.1, 0.005
 """Delays that are looked for, and how finely."""
+COARSE_S = 0.005
+"""Standard deviation of what is found so, half of the step about a right one and what skin does."""
 LEAST_S = 0.016
-"""A lesser delay is left to the filter's state: skin and the model do as much to the centre of mass' acceleration.
+"""A lesser delay is left to `plate_clock`: skin and the model do as much to the centre of mass' acceleration.
 Recordings in step have their minimum at 0 to 6 ms (real, but for one at 15), walks of `truth3d` with joints found from
 markers 5 to 10 ms later than their plates are."""
 LESS = 0.75
@@ -107,10 +109,13 @@ def plates_delay(needed: Needed, force: Array) -> float | None:
     return delay if needed.judged_s(moved[k]) > KEPT * needed.judged_s(force) else None
 
 
-def out_of_step_in_words(delay_s: float) -> str:
+def out_of_step_in_words(delay_s: float, sd_s: float) -> str:
     """Which way, and by how much."""
     where = "behind" if delay_s > 0.0 else "ahead of"
-    return f"By the motion of the centre of mass the plates are {1000.0 * abs(delay_s):.0f} ms {where} the markers"
+    return (
+        f"By the motion the plates are {1000.0 * abs(delay_s):.1f} ms {where} the markers (standard deviation "
+        f"{1000.0 * sd_s:.1f} ms)"
+    )
 
 
 def fitting_rate(needed: Needed, force: Array) -> tuple[float, float] | None:
@@ -159,9 +164,9 @@ def brought_into_step(recording: Recording, delay_s: float) -> Recording:
 
 
 def _later(time: Array, values: Array, delay_s: float) -> Array:
-    """`in_step` of values (T, 3), but NaN beyond the recording."""
-    then = time + delay_s
-    inside = (then >= time[0] - 1e-9) & (then <= time[-1] + 1e-9)
+    """`in_step` of values (T, 3), but NaN more than a frame beyond the recording."""
+    then, frame = time + delay_s, (1.0 + 1e-9) * float(np.median(np.diff(time)))
+    inside = (then >= time[0] - frame) & (then <= time[-1] + frame)
     return np.where(inside[:, None], in_step(time, values, delay_s), np.nan)
 
 

@@ -89,10 +89,12 @@ class Systematic:
         self._R0 = _core.segment_poses(self._errors.model, x)[0]
         self._D0 = self._displacements(_core.marker_jacobian(self._errors.model, x))
         self._D0[:, [kind == "root" for kind in self._errors.kinds]] = 0.0
-        gain, N = self._gain(x)
-        self._B0 = gain @ N
-        self._segments = {name: k for k, name in enumerate(segments)}
         self._model = _core.Model(spec)
+        self._constants = np.array(calibrated.x0)
+        self._rolls = [first[name] for name in rolls(spec) if name in first]
+        gain, N = self._gain(x)
+        self._B0 = gain @ np.hstack([N, self._rolled(self._reference)])
+        self._segments = {name: k for k, name in enumerate(segments)}
         self._variance_scale = noise.variance_scale
         self._inertia = [
             k for k, name in enumerate(calibrated.names) if self.sizes.inertia and name.startswith("inertia/")
@@ -126,21 +128,22 @@ class Systematic:
         errors = self._errors
         gains, effects = [], []
         for h in (-_STEP_S, 0.0, _STEP_S):
-            x = errors.state(q + h * qd + 0.5 * h * h * qdd, qd, qdd)
-            gain, N = self._gain(x, used)
+            moved = q + h * qd + 0.5 * h * h * qdd
+            gain, N = self._gain(errors.state(moved, qd, qdd), used)
             gains.append(gain)
-            effects.append(gain @ N)
+            effects.append(gain @ np.hstack([N, self._rolled(moved)]))
         G, Gd, Gdd = _differences(gains)
         B, Bd, Bdd = _differences(effects)
         x = errors.state(q, qd, qdd)
         T = _core.moment_jacobian(errors.model, x, external)[: self._count]
         size = len(errors.free) + len(errors.placed)
         Tq, Tv, Ta = (T[:, k * size + errors.free] for k in range(3))
-        direct = T[:, errors.placed] @ errors.sources
+        direct = np.hstack([T[:, errors.placed] @ errors.sources, self._rolled_moments(q, qd, qdd, external)])
         moved = Tq @ B + Tv @ Bd + Ta @ Bdd + direct
         found: Parts = {}
-        for kind in OF_JOINTS:
-            chosen = [k for k, own in enumerate(errors.kinds) if own == kind]
+        kinds = (*errors.kinds, *("roll" for _ in self._rolls))
+        for kind in (*OF_JOINTS, "roll"):
+            chosen = [k for k, own in enumerate(kinds) if own == kind]
             outputs = (B - self._B0, Bd, Bdd, moved)  # of angles what changes with the posture: a zero is a definition
             found[kind] = self._labelled(*(np.square(values[:, chosen]).sum(axis=1) for values in outputs))
         found["skin"] = self._labelled(*self._skin(q, qd, qdd, (G, Gd, Gdd), (Tq, Tv, Ta)))
@@ -148,6 +151,22 @@ class Systematic:
         displaced = T[:, errors.first_moments] * errors.masses
         found["mass_centre"] = self._labelled(still, still, still, np.square(displaced).sum(axis=1))
         return found
+
+    def _rolled(self, q: Array) -> Array:
+        """(3 M, L): what joints' centres that move with their angle do to the markers, a m/rad (`rolls`)."""
+        if not self._rolls:
+            return np.zeros((len(self._root_weight), 0))
+        x = self._constants.copy()
+        x[: len(q)] = q
+        return np.asarray(_core.marker_jacobian(self._model, x)[:, self._rolls])
+
+    def _rolled_moments(self, q: Array, qd: Array, qdd: Array, external: Array | None) -> Array:
+        """(C, L): what they do to moments."""
+        if not self._rolls:
+            return np.zeros((self._count, 0))
+        x = self._constants.copy()
+        x[: 3 * len(q)] = np.concatenate([q, qd, qdd])
+        return np.asarray(_core.moment_jacobian(self._model, x, external)[: self._count, self._rolls])
 
     def _skin(
         self, q: Array, qd: Array, qdd: Array, gains: tuple[Array, Array, Array], T: tuple[Array, Array, Array]
@@ -179,6 +198,14 @@ class Systematic:
         T = _core.moment_jacobian(self._model, x, external)[: self._count, self._inertia]
         return np.asarray(((T @ covariance) * T).sum(axis=1))
 
+    def _by_clock(self, x: Array, wrench_rate: Array, segments: Sequence[str]) -> Array:
+        """(C,) variances of moments by loads that act a second later than they did; of wrenches that change by (F, 6) a
+        second. Moments are linear in them."""
+        load = self._external(wrench_rate, segments)
+        return np.square(
+            _core.joint_moments(self._model, x, load) - _core.joint_moments(self._model, x, np.zeros_like(load))
+        )
+
     def _labelled(self, q: Array, qd: Array, qdd: Array, moments: Array) -> dict[str, Array]:
         found = {}
         for name, values in zip(BLOCKS, (q, qd, qdd), strict=False):
@@ -203,10 +230,16 @@ class Systematic:
         chosen = _sampled(time)
         used = in_use(np.isfinite(values_of(data, "markers_measured")).any(axis=2), time)
         each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments, used[k]) for k in chosen]
-        return {
+        found = {
             kind: {block: _between(time, time[chosen], np.array([p[kind][block] for p in each])) for block in BLOCKS}
             for kind in (*KINDS, "inertia")
         }
+        # a load passes from foot to foot within a sample
+        rate = np.gradient(wrench, time, axis=0) if len(time) > 1 else np.zeros_like(wrench)
+        known = np.flatnonzero(np.isfinite(states).all(axis=1))
+        moments = found["clock"]["moments"]
+        moments[known] = [self._by_clock(states[k], rate[k], segments) for k in known]
+        return found
 
     def moments_moved(self, data: xr.Dataset, moved: Sequence[Array]) -> Array:
         """(T, C): what moments change by where coordinates, speeds and accelerations (T, C) are others by ``moved`` and
@@ -227,16 +260,28 @@ class Systematic:
             external[self._segments[name]] += values
         return external
 
-    def _at(self, x: Array, inertia: Array, wrench: Array, segments: Sequence[str], used: Flags | None = None) -> Parts:
-        """`parts` of a state (n,), and "inertia" of this covariance (I, I), with wrenches (F, 6) of contacts on these
-        segments."""
+    def _at(
+        self,
+        x: Array,
+        inertia: Array,
+        wrench: Array,
+        segments: Sequence[str],
+        used: Flags | None = None,
+        wrench_rate: Array | None = None,
+    ) -> Parts:
+        """`parts` of a state (n,), "inertia" of this covariance (I, I), and "clock", with wrenches (F, 6) of contacts
+        on these segments and by how much these change a second (F, 6)."""
         K = len(self._free)
         if not np.isfinite(x[: 3 * K]).all():
             return {kind: {b: np.full(self._count, np.nan) for b in BLOCKS} for kind in (*KINDS, "inertia")}
         external = self._external(wrench, segments)
         still = np.zeros(K)
-        by_inertia = self._labelled(still, still, still, self._by_inertia(x, inertia, external))
-        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external, used) | {"inertia": by_inertia}
+        by_inertia = self._by_inertia(x, inertia, external)
+        by_clock = np.zeros(self._count) if wrench_rate is None else self._by_clock(x, wrench_rate, segments)
+        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external, used) | {
+            "inertia": self._labelled(still, still, still, by_inertia),
+            "clock": self._labelled(still, still, still, by_clock),
+        }
 
     def added(
         self,
@@ -250,18 +295,20 @@ class Systematic:
         off_plates: bool = False,
         late: bool,
         used: Flags | None = None,
+        wrench_rate: Array | None = None,
     ) -> dict[str, Array]:
         """The filter's standard deviations of one frame (block -> (C,)) with these errors.
 
         Args:
             x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. sources, off_plates,
-                late: as of `reported`. used: as of `parts`.
+                late: as of `reported`. used: as of `parts`. wrench_rate: (F, 6) by how much the wrenches change a
+                second; not given: not at all.
         """
         inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
         own = {block: found[block] for block in BLOCKS}
         K = len(self._free)
         intense = movement_intensity(x[2 * K : 3 * K], own["accelerations"][self._free])
-        parts = self._at(x, inertia, wrench, segments, used)
+        parts = self._at(x, inertia, wrench, segments, used, wrench_rate)
         moved = self.moved_m(x)
         return reported(
             self.sizes, self._variance_scale, own, parts, intense, moved, sources, off_plates=off_plates, late=late
@@ -369,6 +416,12 @@ def neutral(calibrated: CalibratedModel) -> Array:
     K = len(free)
     q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
     return q
+
+
+def rolls(spec: _core.ModelSpec) -> list[str]:
+    """Lengths by which the centre of a joint moves with its angle, as elements of the state."""
+    axes = [axis for segment in spec.segments for axis in segment.axes if axis.kind == "translation"]
+    return [f"length/{scale}" for scale in dict.fromkeys(a.scale for a in axes if a.coordinate and a.scale)]
 
 
 def drives(spec: _core.ModelSpec, free: npt.NDArray[np.intp]) -> Array:

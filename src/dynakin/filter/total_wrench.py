@@ -14,12 +14,12 @@ from dynakin.errors import RecordingError
 from dynakin.filter.closure import Closure, closure
 from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
+from dynakin.filter.plate_clock import SAID, Delay, out_of_step
 from dynakin.filter.plate_motion import (
     Needed,
     brought_into_step,
     fitting_rate,
     out_of_step_in_words,
-    plates_delay,
     turned_axes,
     wrong_rate_in_words,
 )
@@ -68,6 +68,7 @@ class Ground:
         usable: whether the plates are used at all.
         load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
         notes: what there is to say. reasons: those of them that say why something is not measured.
+        behind_s: by how much the plates lagged behind the markers and were brought into step.
     """
 
     loads: FootLoads | None
@@ -77,6 +78,7 @@ class Ground:
     load_ratio: float | None
     notes: tuple[Message, ...]
     reasons: tuple[Message, ...]
+    behind_s: float = 0.0
 
 
 def foot_markers(initial: CalibratedModel) -> dict[str, list[str]]:
@@ -141,7 +143,7 @@ def known_ground(
         if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
             raise RecordingError(f"{recording.plates_file}: {wrong}")
         total = np.where(loads.total_known[:, None], wrench[:, :3], np.nan)
-        delay = None if in_step else plates_delay(needed, total)
+        delay = None if in_step else out_of_step(needed, initial, markers, wrench, loads.total_known)
         if delay is not None:
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
         found = None if initial.contacts else fitting_rate(needed, total)
@@ -287,16 +289,17 @@ def _brought_into_step(
     recording: Recording,
     initial: CalibratedModel,
     markers: Array,
-    delay_s: float,
+    delay: Delay,
     assigned: Mapping[str, str] | None,
     tolerance: float | None,
 ) -> tuple[Ground, Array]:
-    """`known_ground` of what the plates say so much later, with a sentence on it."""
-    there = brought_into_step(recording, delay_s)
+    """`known_ground` of what the plates say so much later, with a sentence on it where it is not by chance."""
+    there = brought_into_step(recording, delay.delay_s)
     wrench = initial.ground.wrench_to_ground(there.total_wrench())
     ground, known = known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
-    said = note("in step", f"{out_of_step_in_words(delay_s)}; they were brought into step.")
-    return replace(ground, notes=(said, *ground.notes)), known
+    words = f"{out_of_step_in_words(*delay)}; they were brought into step."
+    said = [note("in step", words)] if abs(delay.delay_s) > SAID * delay.sd_s else []
+    return replace(ground, notes=(*said, *ground.notes), behind_s=delay.delay_s), known
 
 
 def _nearly_all(found: Closure) -> bool:

@@ -77,7 +77,7 @@ class Tracker:
         self._sight = LiveSight(self.calibrated.spec)
         self._time: float | None = None
         self._latest: StepEstimate | None = None
-        self._stepped: deque[_Stepped] = deque(maxlen=lag + 1)
+        self._stepped: deque[_Stepped] = deque(maxlen=lag + 2)  # and the one before, by which loads change
         self._off_plates = False  # whether some foot has stood off the plates
 
     def fresh(self) -> Tracker:
@@ -217,19 +217,31 @@ class Tracker:
             found["moments"] = np.where(step.sources != MEASURED, prior_factor(self.noise), 1.0) * found["moments"]
             found["wrench"] = (prior_factor(self.noise) if step.blind else 1.0) * found["wrench"]
         if self.systematic is not None:
-            wrench = np.zeros((0, 6))
-            if loads is not None:
-                wrench = _core.contact_moments(self.core_model, state, loads)["foot_wrench"]
+            wrench, rate = np.zeros((0, 6)), None
+            if step is not None and step.loads is not None:
+                wrench = _core.contact_moments(self.core_model, state, step.loads)["foot_wrench"]
+                rate = self._wrench_rate(step, state, wrench)
             segments = () if step is None else step.segments
             sources, used = (None, None) if step is None else (step.sources, step.used)
             found |= self.systematic.added(
                 found, state, covariance, wrench, segments,
                 sources=sources, off_plates=self._off_plates, late=late, used=used,
+                wrench_rate=rate,
             )  # fmt: skip
         if step is not None:
             found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])
             found |= {name: np.where(step.unseen, np.nan, found[name]) for name in BLOCKS[:3]}
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
+
+    def _wrench_rate(self, step: _Stepped, state: Array, wrench: Array) -> Array | None:
+        """(F, 6) by how much the contacts' wrenches (F, 6) of a step changed since the one before, a second; None of
+        the first, and where other contacts bore before."""
+        earlier = [each for each in self._stepped if each.time_s < step.time_s]
+        before = max(earlier, default=None, key=lambda each: each.time_s)
+        if before is None or before.loads is None or before.segments != step.segments:
+            return None
+        then = _core.contact_moments(self.core_model, state, before.loads)["foot_wrench"]
+        return np.asarray((wrench - then) / (step.time_s - before.time_s))
 
     def _with_lag(self) -> _core.FixedLag:
         if self._lag is None:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.plate_motion import out_of_step_in_words
+from dynakin.filter.plate_motion import COARSE_S, out_of_step_in_words
 from dynakin.filter.samples import Sample
 from dynakin.filter.tracker import Tracker, live_lag
 from dynakin.messages import Message, about, warning, warnings_of
@@ -400,7 +400,8 @@ class Live:
             self._plate_motion = None
         elif asked.delay_s is not None:
             self.fusion.plates_behind_s += asked.delay_s
-            self.say(f"{out_of_step_in_words(asked.delay_s)}; from {time_s:.2f} s on they are brought into step.")
+            found = out_of_step_in_words(asked.delay_s, COARSE_S)
+            self.say(f"{found}; from {time_s:.2f} s on they are brought into step.")
         if asked.mass is not None and not self._mass_doubted:
             self._mass_doubted = True
             self.say(asked.mass)

@@ -15,6 +15,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.expected import ContactPaths
 from dynakin.filter.prepared import Prepared
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.calibration.inverse_kinematics import fixed_model, inverse_kinematics
 from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
@@ -29,7 +30,6 @@ from dynakin.validation.reference.inverse_dynamics import (
     rigid_motions,
     usual_cutoffs,
 )
-from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse_kinematics
 from dynakin.validation.setup import Setup
 from dynakin.validation.yardsticks import (
     LEFT_OUT,

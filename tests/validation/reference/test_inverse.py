@@ -12,13 +12,13 @@ import dynakin
 from dynakin.bindings import _core
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.prepared import Prepared
+from dynakin.model.calibration.inverse_kinematics import fixed_model, inverse_kinematics
 from dynakin.model.spec import free_names
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.reference.inverse_dynamics import INVERSE, RigidMotion, inverse_name, rigid_motions
-from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse_kinematics
 from dynakin.validation.setup import Setup
 
 FLEXION = [f"{joint}_{side}" for joint in ("hip_flexion", "knee_angle", "ankle_angle") for side in "rl"]

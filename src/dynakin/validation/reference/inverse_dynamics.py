@@ -14,10 +14,10 @@ import numpy.typing as npt
 from dynakin.arrays import rms_length, wrench_about
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.calibration.inverse_kinematics import fixed_model, inverse_kinematics
 from dynakin.recordings.smoothing import MAX_GAP_S, even_step, fill_gaps, smooth
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import ABSENT, MEASURED
-from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse_kinematics
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,0 +1,211 @@
+"""By how much plates and markers are out of step, to a millisecond or two: what the motion of the whole body needs,
+forces and moments, against what the plates say.
+
+The centre of mass as a mean of markers (`plate_motion`) finds tens of milliseconds; a few are lost in skin that follows
+the joints, and a filter takes them up by acceleration. Inverse kinematics frame by frame has neither, and what is not
+known of segments' inertia, which looks like a delay as well, is estimated with it ([derivations](derivations.md),
+section 11).
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_factor, cho_solve
+
+from dynakin.arrays import runs, wrench_about
+from dynakin.bindings import _core
+from dynakin.filter.plate_motion import COARSE_S, Needed, plates_delay
+from dynakin.filter.samples import in_step
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.calibration.inverse_kinematics import inverse_kinematics
+from dynakin.model.calibration.pose_start import bare
+from dynakin.model.inertia import INERTIA_NAMES
+from dynakin.recordings.recording import rate_of
+from dynakin.recordings.resampling import low_pass
+from dynakin.units import GRAVITY_M_S2
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+CUTOFF_HZ = 6.0
+"""Low-pass of motion and plates, of one delay: none."""
+LEAST_S = 0.001
+"""A lesser delay is none."""
+SAID = 2.0
+"""It is said from so many of its standard deviations on; less is taken off as well, and is in the settings used."""
+PRIOR_S = 0.01
+"""How far out of step plates are that nobody complained of: a frame at 100 Hz."""
+MODEL_S = 0.002
+"""What joints, skin and segments that are not rigid do besides: by `truth3d`'s walks 0.3 to 1.3 ms."""
+FORCE, MOMENT_M = 0.033, 0.017
+"""What motion and plates disagree on, parts of the weight (m for moments), at least: 20 N and 10 N m."""
+MASS, CENTRE_M, INERTIA, LEAST_INERTIA = 0.1, 0.02, 0.2, 1e-3
+"""What is not known of segments: parts of mass and moments of inertia (kg m2 at least), m of the centre of mass."""
+OFFSET = 2.0
+"""A constant of each component, of ``FORCE`` and ``MOMENT_M``: a plate's zero, a mass."""
+WIDE_S = 0.03
+"""Prior of a pass, after which the plates are brought into step; the last has `PRIOR_S` about none."""
+PASSES = 3
+SHORTEST_S, END_S, LONGEST_S = 0.4, 0.1, 5.0
+"""Stretches that are judged; their ends are not; so much is, where loads change most."""
+FRAMES_HZ = 100.0
+"""Twice as many frames a second show no more."""
+
+
+class Delay(NamedTuple):
+    """By how much plates lag behind the markers, s, and its standard deviation."""
+
+    delay_s: float
+    sd_s: float
+
+
+def out_of_step(needed: Needed, initial: CalibratedModel, markers: Array, wrench: Array, known: Flags) -> Delay | None:
+    """The plates' delay where it is worth bringing them into step: tens of milliseconds by the centre of mass, a few
+    by the whole body.
+
+    Args:
+        markers, wrench, known: as of `clock_delay`.
+    """
+    coarse = plates_delay(needed, np.where(known[:, None], wrench[:, :3], np.nan))
+    found = clock_delay(initial, needed.time, markers, wrench, known, coarse or 0.0)
+    if found is None:
+        return None if coarse is None else Delay(coarse, COARSE_S)
+    return found if abs(found.delay_s) > LEAST_S else None
+
+
+def clock_delay(
+    initial: CalibratedModel, time: Array, markers: Array, wrench: Array, known: Flags, about_s: float = 0.0
+) -> Delay | None:
+    """The plates' delay; None where nothing can be said.
+
+    Args:
+        markers: (T, M, 3) m, of the model, ground frame; NaN: not seen. wrench: (T, 6) N and N m of all plates, about
+            the ground's origin. known: (T,) frames in which that is all that bears the person. about_s: a delay that
+            was found already, about which it lies.
+    """
+    rate = rate_of(time)
+    if initial.contacts or initial.unseen_kg or not rate >= 4.0 * CUTOFF_HZ:
+        return None
+    known = known & np.isfinite(in_step(time, wrench, about_s)).all(axis=1)
+    body = _Body(initial)
+    judged = [
+        (part, need)
+        for part in _stretches(known, wrench, rate)
+        if (need := body.needed(markers[part], rate / part.step)) is not None
+    ]
+    if not judged:
+        return None
+    noise = initial.weighed_kg * GRAVITY_M_S2 * np.repeat([FORCE, MOMENT_M], 3)
+    prior_sd = np.concatenate([[WIDE_S], body.inertia_sd, OFFSET * noise])
+    delay, variance = about_s, np.inf
+    for _ in range(PASSES):
+        there = in_step(time, wrench, delay)
+        equations = [need.equations(there[part], noise) for part, need in judged]
+        H, v = (np.concatenate(each) for each in zip(*equations, strict=True))
+        step, variance = _solved(H, v, prior_sd, min(2.0 * CUTOFF_HZ / judged[0][1].rate, 1.0))  # low-passed
+        delay = float(np.clip(delay + step, about_s - WIDE_S, about_s + WIDE_S))
+    variance += MODEL_S**2
+    trust = PRIOR_S**2 / (PRIOR_S**2 + variance)
+    return Delay(about_s + trust * (delay - about_s), float(np.sqrt(trust * variance)))
+
+
+class _Needed(NamedTuple):
+    """What a stretch of the motion needs: wrench (T, 6) about the ground's origin, and its derivatives (T, 6, I) by
+    inertia; both low-passed; and the frames whose ends are left out."""
+
+    wrench: Array
+    by_inertia: Array
+    rate: float
+
+    def equations(self, plates: Array, noise: Array) -> tuple[Array, Array]:
+        """Rows H (6 N, 1 + I + 6) and values (6 N,), over their noise (6,), of how plates (T, 6) differ from it by a
+        delay, inertia and a constant; moments about the mean centre of pressure."""
+        measured = low_pass(plates, self.rate, CUTOFF_HZ)
+        load = measured.mean(axis=0)
+        centre = np.array([load[5], 0.0, -load[3]]) / load[1]
+        end = round(END_S * self.rate)
+        inner = slice(end, len(plates) - end)
+        differs = wrench_about(measured - self.wrench, centre)[inner] / noise
+        later = wrench_about(-np.gradient(measured, 1.0 / self.rate, axis=0), centre)[inner] / noise
+        bodies = wrench_about(self.by_inertia.swapaxes(1, 2), centre)[inner] / noise  # (N, I, 6)
+        constant = np.broadcast_to(np.diag(1.0 / noise), (len(differs), 6, 6))
+        H = np.concatenate([later[:, :, None], bodies.swapaxes(1, 2), constant], axis=2)
+        return H.reshape(-1, H.shape[2]), differs.reshape(-1)
+
+
+class _Body:
+    """The calibrated person as a rigid model whose inertia may be somewhat other than it is said to be."""
+
+    def __init__(self, initial: CalibratedModel) -> None:
+        self._initial = initial
+        spec = bare(copy(initial.spec))
+        segments = spec.segments
+        for segment in segments:
+            segment.inertia_estimated = [bool(segment.inertia[0] > 0.0)] * len(INERTIA_NAMES)
+        spec.segments = segments
+        self._model = _core.Model(spec)
+        self._state = np.array(self._model.initial_state())
+        self._inertia = [k for k, name in enumerate(self._model.layout.names) if name.startswith("inertia/")]
+        known = [_unsure(np.array(segment.inertia)) for segment in segments if segment.inertia[0] > 0.0]
+        self.inertia_sd = np.concatenate(known)
+
+    def needed(self, markers: Array, rate: float) -> _Needed | None:
+        """Of a stretch of markers (T, M, 3); None where some frame shows too few."""
+        q = inverse_kinematics(self._initial, markers)
+        if not np.isfinite(q).all():
+            return None
+        q = low_pass(q, rate, CUTOFF_HZ)
+        qd = np.gradient(q, 1.0 / rate, axis=0)
+        motion = np.hstack([q, qd, np.gradient(qd, 1.0 / rate, axis=0)])
+        wrench, by_inertia = np.empty((len(q), 6)), np.empty((len(q), 6, len(self._inertia)))
+        x = self._state.copy()
+        for k, moving in enumerate(motion):
+            x[: len(moving)] = moving
+            wrench[k] = _core.wrench(self._model, x)
+            by_inertia[k] = _core.wrench_jacobian(self._model, x)[:, self._inertia]
+        return _Needed(wrench, by_inertia, rate)
+
+
+def _unsure(inertia: Array) -> Array:
+    """Standard deviations of the ten numbers of a segment, in the order of ``INERTIA_NAMES``."""
+    mass = inertia[0]
+    return np.concatenate(
+        [[MASS * mass], np.full(3, CENTRE_M * mass), np.maximum(INERTIA * np.abs(inertia[4:]), LEAST_INERTIA)]
+    )
+
+
+def _stretches(known: Flags, wrench: Array, rate: float) -> list[slice]:
+    """Stretches of known frames, `LONGEST_S` in all: those in which loads change most; with room for a delay."""
+    room, most = round(WIDE_S * rate) + 1, round(LONGEST_S * rate)
+    found = [(a + room, b - room) for a, b in runs(known) if b - a - 2 * room >= (SHORTEST_S + 2.0 * END_S) * rate]
+    parts = [slice(a, min(a + most, b)) for first, b in found for a in range(first, b, most)]
+    stride = max(int(rate / FRAMES_HZ + 1e-6), 1)
+    parts = [
+        slice(part.start, part.stop, stride)
+        for part in parts
+        if part.stop - part.start >= (SHORTEST_S + 2.0 * END_S) * rate
+    ]
+    change = [float(np.square(np.diff(wrench[part, :3], axis=0)).mean()) for part in parts]
+    chosen, left = list[slice](), most
+    for k in np.argsort(change)[::-1]:
+        if left >= parts[k].stop - parts[k].start or not chosen:
+            chosen.append(parts[k])
+            left -= parts[k].stop - parts[k].start
+    return chosen
+
+
+def _solved(H: Array, values: Array, prior_sd: Array, counts: float) -> tuple[float, float]:
+    """The first unknown and its variance, by least squares with priors, of rows that each count as so much of one; what
+    is left over that is more than the noise counts as noise."""
+    scaled = H * prior_sd
+    factor = cho_factor(counts * scaled.T @ scaled + np.eye(len(prior_sd)))
+    z = cho_solve(factor, counts * scaled.T @ values)
+    first = np.zeros(len(z))
+    first[0] = 1.0
+    left = float(np.mean(np.square(values - scaled @ z)))
+    variance = prior_sd[0] ** 2 * float(cho_solve(factor, first)[0]) * max(1.0, left)
+    return float(prior_sd[0] * z[0]), variance

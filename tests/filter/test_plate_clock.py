@@ -1,0 +1,93 @@
+"""Plates that are a few milliseconds out of step, by the motion of the whole body."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin import Estimator, Subject, load_model
+from dynakin.filter.plate_clock import MODEL_S, PRIOR_S, Delay, clock_delay
+from dynakin.filter.plate_motion import brought_into_step
+from dynakin.filter.prepared import Prepared
+from dynakin.filter.samples import recording_arrays
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.trial import simulate as simulate_anew
+
+simulate = cache(simulate_anew)
+
+
+def person() -> Estimator:
+    return Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male")))
+
+
+@cache
+def prepared() -> Prepared:
+    return person().prepare(simulate("fullbody", "gait", 7, 4.0).recording)
+
+
+def delay_of(recording: Recording, ready: Prepared, about_s: float = 0.0) -> Delay | None:
+    markers, wrench = recording_arrays(recording, ready.calibrated)
+    known = np.isfinite(ready.wrench).all(axis=1) & np.isfinite(wrench).all(axis=1)
+    return clock_delay(ready.calibrated, recording.time, markers, wrench, known, about_s)
+
+
+@pytest.mark.parametrize("moved_s", [-0.01, -0.004, 0.0, 0.006, 0.012])
+def test_a_few_milliseconds_are_found_in_a_walk(moved_s: float) -> None:
+    """Within its deviation, and drawn towards none by as much as that asks for."""
+    ready = prepared()
+    found = delay_of(brought_into_step(simulate("fullbody", "gait", 7, 4.0).recording, -moved_s), ready)
+    assert found is not None and MODEL_S < found.sd_s < 0.0035
+    assert found.delay_s == pytest.approx(moved_s * (1.0 - (found.sd_s / PRIOR_S) ** 2), abs=0.0015)
+
+
+def test_about_a_delay_that_is_known_the_rest_is_found() -> None:
+    late = brought_into_step(simulate("fullbody", "gait", 7, 4.0).recording, -0.04)
+    found = delay_of(late, prepared(), about_s=0.035)
+    assert found is not None and found.delay_s == pytest.approx(0.04, abs=0.002)
+
+
+def test_who_stands_shows_no_delay() -> None:
+    recording = simulate("fullbody", "squat", 7, 8.0).recording.window(0.0, 1.2)
+    ready = person().prepare(recording)
+    found = delay_of(brought_into_step(recording, -0.01), ready)
+    assert found is not None and abs(found.delay_s) < 0.002 and found.sd_s > 0.8 * PRIOR_S
+
+
+def test_nothing_is_said_where_forces_are_missing_or_frames_are_few() -> None:
+    ready, recording = prepared(), simulate("fullbody", "gait", 7, 4.0).recording
+    markers, wrench = recording_arrays(recording, ready.calibrated)
+    known = np.isfinite(wrench).all(axis=1)
+    held = replace(ready.calibrated, contacts={"seat": "pelvis"})
+    assert clock_delay(held, recording.time, markers, wrench, known) is None
+    assert clock_delay(ready.calibrated, recording.time, markers, wrench, np.zeros_like(known)) is None
+    seldom = slice(None, None, 5)
+    assert clock_delay(ready.calibrated, recording.time[seldom], markers[seldom], wrench[seldom], known[seldom]) is None
+
+
+def test_a_run_brings_plates_into_step_and_says_so_where_it_is_not_by_chance() -> None:
+    """A frame late: moments are those of plates in step."""
+    whole = simulate("fullbody", "gait", 7, 4.0).recording
+    late = brought_into_step(whole, -0.01)
+    right, found = (person().run(recording) for recording in (whole, late))
+    assert found.config["ground"]["plates_behind_s"] == pytest.approx(0.01, abs=0.002)
+    assert right.config["ground"]["plates_behind_s"] == pytest.approx(0.0, abs=0.002)
+    assert any("behind the markers" in str(text) for text in found.messages)
+    assert not any("behind the markers" in str(text) for text in right.messages)
+    legs = [name for name in right.data["coordinate"].values if name.startswith(("hip_flexion", "knee", "ankle"))]
+    a, b = (each.data["moments"].sel(coordinate=legs).values for each in (right, found))
+    assert np.sqrt(np.nanmean((a - b) ** 2)) < 1.5
+    assert "plates/delay" not in found.data["element"].values
+
+
+def test_a_real_walk_is_found_to_be_moved_as_far_as_it_was(data_dir: Path) -> None:
+    folder = data_dir / "opencap_subject4"
+    walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    ready = person().prepare(walk)
+    found = [delay_of(brought_into_step(walk, -moved), ready) for moved in (0.0, 0.008)]
+    assert found[0] is not None and found[1] is not None
+    assert found[1].delay_s - found[0].delay_s == pytest.approx(0.008, abs=0.0015)
