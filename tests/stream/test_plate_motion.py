@@ -43,16 +43,18 @@ def as_it_is() -> tuple[list[LiveFrame], list[str], Live]:
 
 def test_plates_in_step_are_left_alone() -> None:
     frames, said, live = as_it_is()
-    assert live.fusion.plates_behind_s == 0.0 and not any("centre of mass" in text for text in said)
+    assert live.fusion.plates_behind_s == 0.0 and not any("brought into step" in text for text in said)
     assert frames[-1].status.plates == "used"
 
 
 @pytest.mark.parametrize("delay_s", [0.04, -0.03])
 def test_plates_that_are_late_are_brought_into_step(delay_s: float) -> None:
     frames, said, live = session(brought_into_step(squat(), -delay_s))
-    (text,) = [text for text in said if "centre of mass" in text]
+    (text,) = [text for text in said if "brought into step" in text]
     side = "behind" if delay_s > 0.0 else "ahead of"
-    (at,) = re.findall(rf"ms {side} the markers; from ([0-9.]+) s on they are brought into step", text)
+    (at,) = re.findall(
+        rf"ms {side} the markers \(standard deviation 5.0 ms\); from ([0-9.]+) s on they are brought into step", text
+    )
     assert live.fusion.plates_behind_s == pytest.approx(delay_s, abs=0.003)
     whole = {round(frame.fused.sample.time_s, 4): frame.fused.wrenches for frame in as_it_is()[0]}
     after = [frame.fused for frame in frames if frame.fused.sample.time_s > float(at) + 0.2]

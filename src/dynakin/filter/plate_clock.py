@@ -18,7 +18,6 @@ from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.arrays import runs, wrench_about
 from dynakin.bindings import _core
-from dynakin.filter.plate_motion import COARSE_S, Needed, plates_delay
 from dynakin.filter.samples import in_step
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.inverse_kinematics import inverse_kinematics
@@ -29,7 +28,6 @@ from dynakin.recordings.resampling import low_pass
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 CUTOFF_HZ = 6.0
 """Low-pass of motion and plates, of one delay: none."""
@@ -52,6 +50,8 @@ WIDE_S = 0.03
 PASSES = 3
 SHORTEST_S, END_S, LONGEST_S = 0.4, 0.1, 5.0
 """Stretches that are judged; their ends are not; so much is, where loads change most."""
+LOADED = 0.3
+"""Of the weight, mean of a stretch."""
 FRAMES_HZ = 100.0
 """Twice as many frames a second show no more."""
 
@@ -63,54 +63,35 @@ class Delay(NamedTuple):
     sd_s: float
 
 
-def out_of_step(needed: Needed, initial: CalibratedModel, markers: Array, wrench: Array, known: Flags) -> Delay | None:
-    """The plates' delay where it is worth bringing them into step: tens of milliseconds by the centre of mass, a few
-    by the whole body.
-
-    Args:
-        markers, wrench, known: as of `clock_delay`.
-    """
-    coarse = plates_delay(needed, np.where(known[:, None], wrench[:, :3], np.nan))
-    found = clock_delay(initial, needed.time, markers, wrench, known, coarse or 0.0)
-    if found is None:
-        return None if coarse is None else Delay(coarse, COARSE_S)
-    return found if abs(found.delay_s) > LEAST_S else None
-
-
-def clock_delay(
-    initial: CalibratedModel, time: Array, markers: Array, wrench: Array, known: Flags, about_s: float = 0.0
-) -> Delay | None:
+def clock_delay(initial: CalibratedModel, time: Array, markers: Array, wrench: Array) -> Delay | None:
     """The plates' delay; None where nothing can be said.
 
     Args:
         markers: (T, M, 3) m, of the model, ground frame; NaN: not seen. wrench: (T, 6) N and N m of all plates, about
-            the ground's origin. known: (T,) frames in which that is all that bears the person. about_s: a delay that
-            was found already, about which it lies.
+            the ground's origin, where that is all that bears the person; NaN elsewhere.
     """
-    rate = rate_of(time)
+    rate, weight = rate_of(time), initial.weighed_kg * GRAVITY_M_S2
     if initial.contacts or initial.unseen_kg or not rate >= 4.0 * CUTOFF_HZ:
         return None
-    known = known & np.isfinite(in_step(time, wrench, about_s)).all(axis=1)
+    stretches = _stretches(wrench, rate, LOADED * weight)
+    if not stretches:
+        return None
     body = _Body(initial)
-    judged = [
-        (part, need)
-        for part in _stretches(known, wrench, rate)
-        if (need := body.needed(markers[part], rate / part.step)) is not None
-    ]
+    judged = [(part, need) for part in stretches if (need := body.needed(markers[part], rate / part.step)) is not None]
     if not judged:
         return None
-    noise = initial.weighed_kg * GRAVITY_M_S2 * np.repeat([FORCE, MOMENT_M], 3)
+    noise = weight * np.repeat([FORCE, MOMENT_M], 3)
     prior_sd = np.concatenate([[WIDE_S], body.inertia_sd, OFFSET * noise])
-    delay, variance = about_s, np.inf
+    delay, variance = 0.0, np.inf
     for _ in range(PASSES):
         there = in_step(time, wrench, delay)
         equations = [need.equations(there[part], noise) for part, need in judged]
         H, v = (np.concatenate(each) for each in zip(*equations, strict=True))
         step, variance = _solved(H, v, prior_sd, min(2.0 * CUTOFF_HZ / judged[0][1].rate, 1.0))  # low-passed
-        delay = float(np.clip(delay + step, about_s - WIDE_S, about_s + WIDE_S))
+        delay = float(np.clip(delay + step, -WIDE_S, WIDE_S))
     variance += MODEL_S**2
     trust = PRIOR_S**2 / (PRIOR_S**2 + variance)
-    return Delay(about_s + trust * (delay - about_s), float(np.sqrt(trust * variance)))
+    return Delay(trust * delay, float(np.sqrt(trust * variance)))
 
 
 class _Needed(NamedTuple):
@@ -178,8 +159,10 @@ def _unsure(inertia: Array) -> Array:
     )
 
 
-def _stretches(known: Flags, wrench: Array, rate: float) -> list[slice]:
-    """Stretches of known frames, `LONGEST_S` in all: those in which loads change most; with room for a delay."""
+def _stretches(wrench: Array, rate: float, least_n: float) -> list[slice]:
+    """Stretches of known frames that bear so much, `LONGEST_S` in all: those in which loads change most; with room for
+    a delay."""
+    known = np.asarray(np.isfinite(wrench).all(axis=1))
     room, most = round(WIDE_S * rate) + 1, round(LONGEST_S * rate)
     found = [(a + room, b - room) for a, b in runs(known) if b - a - 2 * room >= (SHORTEST_S + 2.0 * END_S) * rate]
     parts = [slice(a, min(a + most, b)) for first, b in found for a in range(first, b, most)]
@@ -187,7 +170,7 @@ def _stretches(known: Flags, wrench: Array, rate: float) -> list[slice]:
     parts = [
         slice(part.start, part.stop, stride)
         for part in parts
-        if part.stop - part.start >= (SHORTEST_S + 2.0 * END_S) * rate
+        if part.stop - part.start >= (SHORTEST_S + 2.0 * END_S) * rate and wrench[part, 1].mean() > least_n
     ]
     change = [float(np.square(np.diff(wrench[part, :3], axis=0)).mean()) for part in parts]
     chosen, left = list[slice](), most

@@ -14,12 +14,14 @@ from dynakin.errors import RecordingError
 from dynakin.filter.closure import Closure, closure
 from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
-from dynakin.filter.plate_clock import SAID, Delay, out_of_step
+from dynakin.filter.plate_clock import LEAST_S, SAID, Delay, clock_delay
 from dynakin.filter.plate_motion import (
+    COARSE_S,
     Needed,
     brought_into_step,
     fitting_rate,
     out_of_step_in_words,
+    plates_delay,
     turned_axes,
     wrong_rate_in_words,
 )
@@ -101,20 +103,36 @@ def known_ground(
     wrench: Array,
     assigned: Mapping[str, str] | None = None,
     tolerance: float | None = None,
-    in_step: bool = False,
 ) -> tuple[Ground, Array]:
     """What is known of the ground, and the total wrench (T, 6) without (NaN) the frames in which the plates do not
-    carry all of the person.
+    carry all of the person; of plates that are in step, or brought into it.
 
     Args:
         markers: (T, M, 3) m, of the model, ground frame. assigned: plate -> foot, as for `foot_loads`.
-        in_step: whether nobody need ask any more if the plates lag behind the markers.
         tolerance: part of the weight by which the plates' mean may differ where `closure` cannot judge; None: nobody
             asks.
 
     Raises:
         RecordingError: the plates are refused.
     """
+    ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance)
+    left = clock_delay(initial, recording.time, markers, known) if ground.loads is not None else None
+    if left is None or abs(left.delay_s) < LEAST_S:
+        return ground, known
+    delay = Delay(ground.behind_s + left.delay_s, left.sd_s)
+    return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
+
+
+def _known_ground(
+    recording: Recording,
+    initial: CalibratedModel,
+    markers: Array,
+    wrench: Array,
+    assigned: Mapping[str, str] | None = None,
+    tolerance: float | None = None,
+    in_step: bool = False,
+) -> tuple[Ground, Array]:
+    """`known_ground` of plates that are in step within some milliseconds, or (not ``in_step``) are brought into it."""
     n = recording.n_frames
     loads = _loads_of_feet(recording, initial, assigned)
     may, by_plate = _declared_contacts(initial, markers, loads)
@@ -132,7 +150,7 @@ def known_ground(
     if check.refusal:
         raise RecordingError(f"{recording.plates_file}: {check.refusal}")
     if check.unused:
-        ground, nothing = known_ground(recording.with_plates(()), initial, markers, np.full_like(wrench, np.nan))
+        ground, nothing = _known_ground(recording.with_plates(()), initial, markers, np.full_like(wrench, np.nan))
         loads = ground.loads
         if loads is not None:  # the recording keeps its plates, with nobody on any
             loads = replace(loads, on=np.zeros((n, len(loads.feet), len(recording.plates)), dtype=bool))
@@ -143,9 +161,9 @@ def known_ground(
         if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
             raise RecordingError(f"{recording.plates_file}: {wrong}")
         total = np.where(loads.total_known[:, None], wrench[:, :3], np.nan)
-        delay = None if in_step else out_of_step(needed, initial, markers, wrench, loads.total_known)
+        delay = None if in_step else plates_delay(needed, total)
         if delay is not None:
-            return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
+            return _brought_into_step(recording, initial, markers, Delay(delay, COARSE_S), assigned, tolerance)
         found = None if initial.contacts else fitting_rate(needed, total)
         if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
             off_rate = [warning("rate", wrong_rate_in_words(needed.rate, *found))]
@@ -296,7 +314,7 @@ def _brought_into_step(
     """`known_ground` of what the plates say so much later, with a sentence on it where it is not by chance."""
     there = brought_into_step(recording, delay.delay_s)
     wrench = initial.ground.wrench_to_ground(there.total_wrench())
-    ground, known = known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
+    ground, known = _known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
     words = f"{out_of_step_in_words(*delay)}; they were brought into step."
     said = [note("in step", words)] if abs(delay.delay_s) > SAID * delay.sd_s else []
     return replace(ground, notes=(*said, *ground.notes), behind_s=delay.delay_s), known
