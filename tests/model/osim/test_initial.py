@@ -13,7 +13,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition, load_model
-from dynakin.model.opensim.calibrate import feet_of, limits_of
+from dynakin.model.opensim.calibrate import limits_of
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import skin_of
@@ -162,7 +162,6 @@ def test_a_whole_turn_is_no_limit(tmp_path: Path) -> None:
     assert limits["base_rx"] == (-np.inf, np.inf)
     assert limits["q"] == (-2.0, 2.0)
     assert limits["base_tx"] == (-np.inf, np.inf)  # the laboratory of the file is not that of the recording
-    assert feet_of(read_osim(path)) == {}
 
 
 def test_noise_of_a_marker_comes_from_its_name_or_its_body() -> None:

@@ -18,7 +18,6 @@ from dynakin.model.opensim.calibrate import (
     beyond_range,
     estimated_bodies,
     facing_pairs,
-    feet_of,
     first_frame,
     foot_markers,
     limits_of,
@@ -28,6 +27,7 @@ from dynakin.model.opensim.calibrate import (
     refuse_too_few,
 )
 from dynakin.model.opensim.description import OpenSimModel
+from dynakin.model.opensim.feet import feet_of
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import moved_by, to_spec, unseen
@@ -117,8 +117,10 @@ class OpenSimDefinition:
         refuse_other_gravity(source)
         find = find_laboratory_frame if source.floating else find_ground_frame
         chosen, said = sites(source, options.leave_out, recording)
-        on_feet = foot_markers(source, chosen)
-        frame = ground or find(recording, vertical=vertical, forward=forward, pairs=facing_pairs(source, chosen))
+        feet, found_by = feet_of(source, {str(side): body for side, body in options.feet.items()})
+        on_feet = foot_markers(source, chosen, feet)
+        pairs = facing_pairs(source, chosen, feet)
+        frame = ground or find(recording, vertical=vertical, forward=forward, pairs=pairs)
         messages += frame.how
         if options.scale_masses:
             source = of_subject(
@@ -126,7 +128,7 @@ class OpenSimDefinition:
             )
         else:
             messages.append(f"Mass {source.mass:.2f} kg: the OpenSim file's.")
-        messages += said
+        messages += [*said, *found_by]
         if static is not None:
             messages.append("The standing trial gives the mass only.")
         kept = options.marker_places == "kept"
@@ -196,7 +198,7 @@ class OpenSimDefinition:
             parts={},
             messages=tuple(messages),
             plan=None,
-            feet=feet_of(source),
+            feet=feet,
             foot_markers=on_feet,
             unmodelled_m=np.full(len(skin), _MODEL_M),
             skin_lasts=_SKIN_LASTS,
