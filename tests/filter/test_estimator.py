@@ -15,6 +15,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.pipeline.result import Result
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.sources import DERIVED, MEASURED, wrench_sources
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate_squat
@@ -164,6 +165,31 @@ def test_what_each_sensor_said_is_in_steps_run_and_file(trial: SimulatedTrial, t
         np.testing.assert_allclose(stored["test_ratio"].values, ratio, rtol=3e-4)
         np.testing.assert_allclose(stored["markers_innovation_sd"].values, data["markers_innovation_sd"].values, 3e-4)
         assert stored["verdict"].attrs["flag_meanings"] == "missing accepted refused"
+
+
+@pytest.mark.parametrize(("frames", "warned"), [(300, True), (1, False)])
+def test_where_plates_are_refused_moments_are_derived(trial: SimulatedTrial, frames: int, warned: bool) -> None:
+    """From frame 301 on they lie 0.25 m off: in flags, counts, words, the total wrench, and live."""
+    off = np.zeros((601, 3))
+    off[301 : 301 + frames, 0] = 0.25
+    moved = [dataclasses.replace(p, moment=p.moment + np.cross(off, p.force)) for p in trial.recording.plates]
+    recording = trial.recording.with_plates(tuple(moved))
+    found = estimator().run(recording)
+    refused = found.data["verdict"].values[:, -1] == 2
+    assert refused[301 : 301 + frames].all() and refused.sum() <= frames + 2
+    for name in ("moment_source", "joint_source"):
+        assert ((found.data[name].values == DERIVED) == refused[:, None]).all()
+    assert (wrench_sources(found.data)[refused] != MEASURED).all()
+    metrics = compute_metrics(found)["moments"]
+    assert metrics["legs"][""] == {
+        "measured": 601 - refused.sum(), "derived": refused.sum(), "prior": 0, "absent": 0
+    }  # fmt: skip
+    said = [text for text in found.messages if "The plates contradict the motion" in text]
+    assert [text.startswith("Warning: ") for text in said] == [warned]
+    assert f"in {refused.sum()} of 601 frames" in metrics["reasons"][0]
+    live = estimator().start(recording)
+    for k, sample in enumerate(samples(recording)[:310]):
+        assert (live.step(sample).moment_sources == DERIVED).all() == (live.verdicts[-1] == "refused"), k
 
 
 def test_a_marker_far_beyond_all_numbers_is_divergence_at_its_frame(trial: SimulatedTrial) -> None:

@@ -27,8 +27,8 @@ from dynakin.recordings.low_passed import LowPass
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import nearly_singular
-from dynakin.results.measures.sources import MEASURED
-from dynakin.results.records import NO_ESTIMATE_CODES, Timing
+from dynakin.results.measures.sources import MEASURED, plates_refused
+from dynakin.results.records import NO_ESTIMATE_CODES, WARNING, Timing
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
 
@@ -36,6 +36,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = npt.NDArray[np.float64]
+
+MANY_REFUSED = 0.2
+"""Part of the frames: a chair that is sat on unannounced has 5 % refused, plates that were moved all from then on."""
 
 
 def assemble(
@@ -78,6 +81,9 @@ def assemble(
         if beyond.any():
             reasons.append(impossible_in_words(beyond, feet, forces, recording.time, weight, soles))
             notes = [*notes, reasons[-1]]
+    elif text := _refused_in_words(whole):
+        reasons.append(text)
+        notes = [*notes, text]
     data = with_sources(
         whole,
         feet,
@@ -137,6 +143,21 @@ def assemble(
     )
     estimate.messages.extend([*_without_infinities(data), *nearly_singular(estimate)])
     return estimate
+
+
+def _refused_in_words(data: xr.Dataset) -> str:
+    """A sentence on the plates' frames that were refused, of a model whose moments rest on their sum; a warning where
+    they are many."""
+    estimated = ~np.isin(data["tracking"].values, NO_ESTIMATE_CODES)
+    refused = plates_refused(data) & estimated
+    if not refused.any():
+        return ""
+    count, of = np.count_nonzero(refused), np.count_nonzero(estimated)
+    text = (
+        f"The plates contradict the motion in {count} of {of} frames and are not used there: moments are derived from "
+        "the motion."
+    )
+    return f"{WARNING}{text} Check the plates' places and units." if count > MANY_REFUSED * of else text
 
 
 def _widen_priors(data: xr.Dataset, factor: float, blind: npt.NDArray[np.bool_]) -> None:
