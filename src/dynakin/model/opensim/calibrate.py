@@ -52,18 +52,6 @@ def beyond_range(source: OpenSimModel, start: dict[str, float]) -> list[str]:
     ]
 
 
-def refuse_other_gravity(source: OpenSimModel) -> None:
-    """
-    Raises:
-        ModelError: gravity is not along -Y.
-    """
-    x, y, z = source.gravity
-    if y >= 0.0 or abs(x) + abs(z) > 1e-9:
-        raise ModelError(
-            f"{source.path}: gravity is {x:g} {y:g} {z:g}, expected it along -Y (the ground frame of models)"
-        )
-
-
 def of_subject(
     source: OpenSimModel,
     subject: Subject,

@@ -23,7 +23,6 @@ from dynakin.model.opensim.calibrate import (
     limits_of,
     of_subject,
     reach_of,
-    refuse_other_gravity,
     refuse_too_few,
 )
 from dynakin.model.opensim.description import OpenSimModel
@@ -114,7 +113,6 @@ class OpenSimDefinition:
         the laboratory, Y up; X is forward where it is asked for, or where the file holds the body so that it cannot
         head anywhere."""
         source, options, messages = self.source, self.options, list(self.source.left_out)
-        refuse_other_gravity(source)
         find = find_laboratory_frame if source.floating else find_ground_frame
         chosen, said = sites(source, options.leave_out, recording)
         feet, found_by = feet_of(source, {str(side): body for side, body in options.feet.items()})
