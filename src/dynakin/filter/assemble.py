@@ -198,6 +198,10 @@ def _dataset(
     data: dict[str, Any] = {}
     for block, values in _coordinate_blocks(arrays, model).items():
         data[block] = (("time", "coordinate"), values)
+    if initial.coupled is not None:
+        names = [coordinate.name for coordinate in spec.coordinates]
+        values = initial.coupled.values(names, data["coordinates"][1])
+        data["coupled_coordinates"] = (("time", "coupled_coordinate"), values)
     data["moments"] = (("time", "coordinate"), arrays["moments"])
     data["moments_sd"] = (("time", "coordinate"), arrays["moments_sd"])
     missing = np.count_nonzero(np.isnan(measured[0]), axis=2, keepdims=True) > 0

@@ -25,6 +25,7 @@ from dynakin.model.opensim.calibrate import (
     reach_of,
     refuse_too_few,
 )
+from dynakin.model.opensim.coupled import coupled_of
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.feet import feet_of
 from dynakin.model.opensim.read import read_osim
@@ -203,6 +204,7 @@ class OpenSimDefinition:
             dimensionless=frozenset(lengths),
             unmarked_kg=sum(bodies[name].mass for name in moved_by(source, lock)),
             held=dict.fromkeys(lock, "it moves no measured marker"),
+            coupled=coupled_of(source),
         )
 
 

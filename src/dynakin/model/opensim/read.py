@@ -146,12 +146,11 @@ def _in_order(model: Node, joints: list[tuple[Node, Joint]], bodies: list[str]) 
 
 def _markers(model: Node, frames: Frames | None, bodies: set[str]) -> tuple[Marker, ...]:
     found: dict[str, Marker] = {}
-    for node in model.objects("MarkerSet"):
-        if node.tag != "Marker":
-            continue
+    nodes = [(f"/markerset/{node.name}", node) for node in model.objects("MarkerSet") if node.tag == "Marker"]
+    for path, node in [*nodes, *(frames.markers if frames is not None else ())]:
         x, y, z = node.numbers("location", 3)
         if frames is not None:
-            body, offset = frames.resolve(node, f"/markerset/{node.name}", "parent_frame")
+            body, offset = frames.resolve(node, path, "parent_frame")
             x, y, z = offset.then(Offset((x, y, z))).translation
         else:
             body = node.word("body")
