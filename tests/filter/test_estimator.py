@@ -214,6 +214,14 @@ def test_plates_upside_down_are_refused_with_the_number(trial: SimulatedTrial) -
         estimator().run(trial.recording.with_plates(tuple(turned)))
 
 
+def test_plates_that_are_not_there_are_refused_where_all_are_taken_together(trial: SimulatedTrial) -> None:
+    first = trial.recording.plates[0].name
+    for plates, words in (({"plate 9": "right"}, "'plate 9' is not in"), ({first: "middle"}, "given to 'middle'")):
+        with pytest.raises(ConfigError, match=words):
+            estimator(plates=plates).run(trial.recording)
+    estimator(plates={first: "right"}).prepare(trial.recording)
+
+
 def test_noise_for_a_marker_that_is_not_used_is_refused(trial: SimulatedTrial) -> None:
     with pytest.raises(ConfigError, match=r"noise\.marker_variance_m2: r_nose not among the markers used"):
         estimator(noise=dynakin.presets.paper().changed(marker_variance_m2={"r_nose": 1e-3})).run(trial.recording)
