@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.model.opensim.read import read_osim
+from dynakin.model.opensim.definition import load_opensim
 from dynakin.model.opensim.sites import with_mass
 from support.osim.files import coordinates, version_4
 
@@ -39,7 +39,10 @@ def write(path: Path, constraints: str = "", marker: str = "") -> Path:
 def test_a_chair_on_the_ground_is_left_out_and_named(tmp_path: Path) -> None:
     alone = tmp_path / "alone.osim"
     alone.write_text(version_4("PinJoint", ("q",)))
-    person, found = read_osim(alone), read_osim(write(tmp_path / "chair.osim", coupler("rail_x", "q")))
+    person, found = (
+        load_opensim(alone).source,
+        load_opensim(write(tmp_path / "chair.osim", coupler("rail_x", "q"))).source,
+    )
     assert (found.bodies, found.joints, found.couplers) == (person.bodies, person.joints, person.couplers)
     assert found.floating == person.floating != ()
     assert [text for text in found.left_out if "chair (200 kg)" in text and "base" in text]
@@ -50,9 +53,9 @@ def test_a_chair_on_the_ground_is_left_out_and_named(tmp_path: Path) -> None:
 def test_markers_on_both_and_a_person_that_follows_the_chair_are_refused(tmp_path: Path) -> None:
     place = "<socket_parent_frame>/bodyset/chair</socket_parent_frame><location>0 0 0</location>"
     with pytest.raises(ModelError, match=r"both\.osim: .*chair \(back\) and base \(m\); expected one person"):
-        read_osim(write(tmp_path / "both.osim", "", f'<Marker name="back">{place}</Marker>'))
+        load_opensim(write(tmp_path / "both.osim", "", f'<Marker name="back">{place}</Marker>'))
     with pytest.raises(ModelError, match="coupler 'c': q follows rail_x"):
-        read_osim(write(tmp_path / "follows.osim", coupler("q", "rail_x")))
+        load_opensim(write(tmp_path / "follows.osim", coupler("q", "rail_x")))
 
 
 def test_without_markers_nothing_is_told_apart(tmp_path: Path) -> None:
@@ -60,4 +63,4 @@ def test_without_markers_nothing_is_told_apart(tmp_path: Path) -> None:
     text = path.read_text()
     start, end = text.index("<MarkerSet>"), text.index("</MarkerSet>")
     path.write_text(text[:start] + "<MarkerSet><objects/>" + text[end:])
-    assert [body.name for body in read_osim(path).bodies] == ["chair", "base", "tip"]
+    assert [body.name for body in load_opensim(path).source.bodies] == ["chair", "base", "tip"]

@@ -28,6 +28,7 @@ from dynakin.model.opensim.calibrate import (
 from dynakin.model.opensim.coupled import coupled_of
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.feet import feet_of
+from dynakin.model.opensim.person import person_of
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import moved_by, to_spec, unseen
@@ -38,6 +39,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.settings.model import Bounds, OpenSimOptions, Priors
 from dynakin.settings.strict import nearest, validate
 from dynakin.settings.subject import Subject
+from dynakin.units import gravity_problem
 
 _MODEL_M = 0.003
 """Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
@@ -220,7 +222,9 @@ def load_opensim(
     Raises:
         ModelError: the file or an option is wrong, or holds what is not supported; its place is named.
     """
-    source = read_osim(path)
+    source = person_of(read_osim(path))
+    if problem := gravity_problem(source.gravity):
+        raise ModelError(f"{source.path}: gravity: {problem}")
     given = {} if options is None else options.model_dump()
     chosen = validate(OpenSimOptions, given | fields, "OpenSim model")
     scales = scale_names(source, chosen.scale, share=chosen.share_sides)

@@ -36,8 +36,8 @@ def feet_of(source: OpenSimModel, declared: Mapping[str, str] | None = None) -> 
     names = ", ".join(f"{body} as the {side} foot" for side, body in known.items()) or "neither foot"
     raise ModelError(
         f"{source.path}: found {names} among the bodies {', '.join(b.name for b in source.bodies)}, expected both: "
-        'where the ground acts decides every moment. Name them under [opensim] of a --config: feet = { right = "BODY", '
-        'left = "BODY" }'
+        "where the ground acts decides every moment. Name them under [opensim] of a configuration (.toml): "
+        'feet = { right = "BODY", left = "BODY" }'
     )
 
 

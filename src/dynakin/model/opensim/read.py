@@ -12,10 +12,9 @@ from dynakin.model.opensim.description import GROUND, Body, Coordinate, Coupler,
 from dynakin.model.opensim.frames import Frames, read_offset
 from dynakin.model.opensim.functions import function_of, joined, polynomial, read_function
 from dynakin.model.opensim.joints import read_axes, read_coordinate
-from dynakin.model.opensim.person import person_of
 from dynakin.model.opensim.xml_file import Node, read_xml
 from dynakin.settings.strict import nearest
-from dynakin.units import GRAVITY_M_S2, gravity_problem
+from dynakin.units import GRAVITY_M_S2
 
 _OLDEST = 20000  # before that, OpenSim 1's files are built otherwise
 _MOST = 1000  # bodies or joints: whole bodies with fingers and vertebrae have a fifth
@@ -33,7 +32,7 @@ _NOT_MECHANICS = {
 
 
 def read_osim(path: str | Path) -> OpenSimModel:
-    """The bodies, joints, coordinate couplers and markers of the person in an OpenSim model (`person_of`).
+    """The bodies, joints, coordinate couplers and markers of an OpenSim model.
 
     Raises:
         ModelError: not an OpenSim model, damaged, or with a part of its mechanics that is not supported (other joints,
@@ -63,9 +62,7 @@ def read_osim(path: str | Path) -> OpenSimModel:
     couplers, said = _couplers(model, set(names))
     markers = _markers(model, Frames(model) if newer else None, {GROUND, *(body.name for body in bodies)})
     gravity = model.numbers("gravity", 3, (0.0, -GRAVITY_M_S2, 0.0))
-    if problem := gravity_problem(gravity):
-        model.need("gravity").fail(problem)
-    found = OpenSimModel(
+    return OpenSimModel(
         name=model.name or path.stem,
         path=path,
         gravity=(gravity[0], gravity[1], gravity[2]),
@@ -75,7 +72,6 @@ def read_osim(path: str | Path) -> OpenSimModel:
         markers=markers,
         left_out=(*said, *_left_out(model)),
     )
-    return person_of(found)
 
 
 def _coordinates(joint: Node, nodes: list[Node]) -> tuple[Coordinate, ...]:
