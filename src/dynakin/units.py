@@ -3,10 +3,22 @@ radians. How large persons are, by which a wrong unit shows."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 GRAVITY_M_S2 = 9.80665
 """Standard gravity, m/s^2 (CGPM 1901): the value in every model's gravity vector (0, -9.80665, 0)."""
+GRAVITY_ON_EARTH_M_S2 = (9.7, 9.9)
+"""Between which it lies wherever people are measured (9.764 to 9.834, Hirt et al. 2013), 9.8 and 9.81 too."""
+
+
+def gravity_problem(gravity: Sequence[float]) -> str:
+    """What is wrong with a model's gravity (3,) m/s^2, what was found and expected; empty where it is the earth's."""
+    x, y, z = gravity
+    low, high = GRAVITY_ON_EARTH_M_S2
+    if low <= -y <= high and abs(x) + abs(z) <= 1e-9:
+        return ""
+    return f"found {x:g} {y:g} {z:g}, expected 0 -{GRAVITY_M_S2} 0 (along -Y, {low:g} to {high:g} m/s^2)"
+
 
 PERSON_MASS_KG = (5.0, 400.0)
 """Of persons, as plates and files say it: beyond it the unit is another one. A mass that is given may be smaller, as

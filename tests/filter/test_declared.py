@@ -171,6 +171,8 @@ def test_a_declared_rail_takes_what_the_plates_lack_on_the_hand() -> None:
         ),
         (["seat", "seat"], "'seat' is declared twice"),
         (["right"], "expected another name than right, left, residual"),
+        ([{"name": "r", "segment": "hand_r"}], "found 'r', expected another name"),  # feet.sto: ground_force_r_vx
+        ([{"name": "l", "segment": "hand_r"}], "found 'l', expected another name"),
         ([{"name": "rail", "side": "right"}], "unknown key 'side'"),
     ],
 )

@@ -15,6 +15,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.pipeline.result import Result
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.sources import DERIVED, MEASURED, wrench_sources
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate_squat
@@ -166,6 +167,31 @@ def test_what_each_sensor_said_is_in_steps_run_and_file(trial: SimulatedTrial, t
         assert stored["verdict"].attrs["flag_meanings"] == "missing accepted refused"
 
 
+@pytest.mark.parametrize(("frames", "warned"), [(300, True), (1, False)])
+def test_where_plates_are_refused_moments_are_derived(trial: SimulatedTrial, frames: int, warned: bool) -> None:
+    """From frame 301 on they lie 0.25 m off: in flags, counts, words, the total wrench, and live."""
+    off = np.zeros((601, 3))
+    off[301 : 301 + frames, 0] = 0.25
+    moved = [dataclasses.replace(p, moment=p.moment + np.cross(off, p.force)) for p in trial.recording.plates]
+    recording = trial.recording.with_plates(tuple(moved))
+    found = estimator().run(recording)
+    refused = found.data["verdict"].values[:, -1] == 2
+    assert refused[301 : 301 + frames].all() and refused.sum() <= frames + 2
+    for name in ("moment_source", "joint_source"):
+        assert ((found.data[name].values == DERIVED) == refused[:, None]).all()
+    assert (wrench_sources(found.data)[refused] != MEASURED).all()
+    metrics = compute_metrics(found)["moments"]
+    assert metrics["legs"][""] == {
+        "measured": 601 - refused.sum(), "derived": refused.sum(), "prior": 0, "absent": 0
+    }  # fmt: skip
+    said = [message for message in found.messages if "The plates contradict the motion" in message.text]
+    assert [message.level == "warning" for message in said] == [warned]
+    assert f"in {refused.sum()} of 601 frames" in metrics["reasons"][0]
+    live = estimator().start(recording)
+    for k, sample in enumerate(samples(recording)[:310]):
+        assert (live.step(sample).moment_sources == DERIVED).all() == (live.verdicts[-1] == "refused"), k
+
+
 def test_a_marker_far_beyond_all_numbers_is_divergence_at_its_frame(trial: SimulatedTrial) -> None:
     knee = trial.recording.marker_names.index("r_knee")
 
@@ -186,6 +212,14 @@ def test_plates_upside_down_are_refused_with_the_number(trial: SimulatedTrial) -
     turned = [dataclasses.replace(p, force=-p.force, moment=-p.moment) for p in trial.recording.plates]
     with pytest.raises(RecordingError, match=r"vertical force is -\d+\.\d N"):
         estimator().run(trial.recording.with_plates(tuple(turned)))
+
+
+def test_plates_that_are_not_there_are_refused_where_all_are_taken_together(trial: SimulatedTrial) -> None:
+    first = trial.recording.plates[0].name
+    for plates, words in (({"plate 9": "right"}, "'plate 9' is not in"), ({first: "middle"}, "given to 'middle'")):
+        with pytest.raises(ConfigError, match=words):
+            estimator(plates=plates).run(trial.recording)
+    estimator(plates={first: "right"}).prepare(trial.recording)
 
 
 def test_noise_for_a_marker_that_is_not_used_is_refused(trial: SimulatedTrial) -> None:

@@ -84,6 +84,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
         held={},
         unmarked_joints=(),
         unmarked_feet={},
+        coupled=None,
         guessed_places=False,
         soft_tissue_m=np.zeros(len(SPEC.markers)),
         x0=data.x0,

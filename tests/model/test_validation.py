@@ -46,6 +46,8 @@ def test_every_built_in_model_loads() -> None:
         ("planar = true", 'planar = "perhaps"', ["planar", "'perhaps'"]),
         ('name = "shank"\nparent', 'name = "foot"\nparent', ["'foot' is given twice"]),
         ('frame = { y = ["knee", "hip"] }', "frame = {}", ["one or two of x, y, z"]),
+        ("planar = true", "planar = true\ngravity = [0.0, -981.0, 0.0]", ["gravity: found 0 -981 0", "9.7 to 9.9"]),
+        ("planar = true", "planar = true\ngravity = [-9.81, 0.0, 0.0]", ["gravity: found -9.81 0 0", "along -Y"]),
         ("schema_version = 1\n", "", ["schema_version", "required"]),
         ('lock_to = "trunk"', 'lock_to = "foot"', ["lock_to", "no neighbour"]),
         ("direction = [0.0, 1.0, 0.0] }]\naxes = [{ coordinate = \"knee\" }]",

@@ -20,7 +20,7 @@ from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import hidden_segments, with_sources
 from dynakin.filter.systematic import Systematic
 from dynakin.filter.taken import with_taken
-from dynakin.messages import Message, warning
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import ON_PLATE, UNMEASURED
@@ -28,7 +28,7 @@ from dynakin.recordings.low_passed import LowPass
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import nearly_singular
-from dynakin.results.measures.sources import MEASURED
+from dynakin.results.measures.sources import MEASURED, plates_refused
 from dynakin.results.records import NO_ESTIMATE_CODES, Timing
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = npt.NDArray[np.float64]
+
+MANY_REFUSED = 0.2
+"""Part of the frames: a chair that is sat on unannounced has 5 % refused, plates that were moved all from then on."""
 
 
 def assemble(
@@ -80,6 +83,9 @@ def assemble(
             said = impossible_in_words(beyond, feet, forces, recording.time, weight, soles)
             reasons.append(said.text)
             notes = [*notes, said]
+    elif refused := _refused_in_words(whole):
+        reasons.append(refused.text)
+        notes = [*notes, refused]
     data = with_sources(
         whole,
         feet,
@@ -142,6 +148,22 @@ def assemble(
     return estimate
 
 
+def _refused_in_words(data: xr.Dataset) -> Message | None:
+    """On the plates' frames that were refused, of a model whose moments rest on their sum; a warning where they are
+    many."""
+    estimated = ~np.isin(data["tracking"].values, NO_ESTIMATE_CODES)
+    refused = plates_refused(data) & estimated
+    if not refused.any():
+        return None
+    count, of = np.count_nonzero(refused), np.count_nonzero(estimated)
+    text = (
+        f"The plates contradict the motion in {count} of {of} frames and are not used there: moments are derived from "
+        "the motion."
+    )
+    many = count > MANY_REFUSED * of
+    return warning("plates", f"{text} Check the plates' places and units.") if many else note("plates", text)
+
+
 def _widen_priors(data: xr.Dataset, factor: float, blind: npt.NDArray[np.bool_]) -> None:
     """In place, by `prior_factor`: deviations of what rests on a contact that no plate measures; of the total wrench in
     frames (T,) in which no plate measures anything."""
@@ -180,6 +202,10 @@ def _dataset(
     data: dict[str, Any] = {}
     for block, values in _coordinate_blocks(arrays, model).items():
         data[block] = (("time", "coordinate"), values)
+    if initial.coupled is not None:
+        names = [coordinate.name for coordinate in spec.coordinates]
+        values = initial.coupled.values(names, data["coordinates"][1])
+        data["coupled_coordinates"] = (("time", "coupled_coordinate"), values)
     data["moments"] = (("time", "coordinate"), arrays["moments"])
     data["moments_sd"] = (("time", "coordinate"), arrays["moments_sd"])
     missing = np.count_nonzero(np.isnan(measured[0]), axis=2, keepdims=True) > 0

@@ -40,6 +40,13 @@ def labels(
         "joint_parent": ("joint", parents),
         "joint_segment": ("joint", segments),
     }
+    if initial.coupled is not None:
+        kinds_and_hosts = initial.coupled.kinds.values()
+        found |= {
+            "coupled_coordinate": list(initial.coupled.kinds),
+            "coupled_coordinate_type": ("coupled_coordinate", [kind for kind, _ in kinds_and_hosts]),
+            "coupled_coordinate_follows": ("coupled_coordinate", [host for _, host in kinds_and_hosts]),
+        }
     if feet is not None:
         found |= {
             "foot": list(feet.names),

@@ -66,7 +66,7 @@ class Prepared:
 
     def moment_figures(self) -> dict[str, Any]:
         """Which moments will be measured, derived, a prior and absent, and why, as `moment_figures` of an estimate;
-        frames in which the filter will lose the person are not known yet."""
+        frames in which the filter will lose the person or refuse the plates are not known yet."""
         import xarray as xr  # the slowest library of all: what precedes the core does without
 
         calibrated = self.calibrated

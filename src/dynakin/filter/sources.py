@@ -21,6 +21,7 @@ from dynakin.results.measures.sources import (
     Hidden,
     contact_sources,
     out_of_sight,
+    plates_refused,
 )
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def with_sources(
     A load is as good as the worst of the contacts behind its joint (`contact_sources`). Where something undeclared
     bears the person, it may touch any segment but those between the feet and the thighs, and a foot on no plate: what
     lies there, or has such a foot behind it, is absent. A model that stands on its root has the plates' sum behind
-    every joint: without it all is derived, or absent where undeclared.
+    every joint: without it, or where it was refused, all is derived, or absent where undeclared.
 
     Args:
         data: with the joints' tree and, of floating models, the core's ``moment_source``.
@@ -66,8 +67,8 @@ def with_sources(
     moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
     blind = np.isnan(values_of(data, "wrench_measured")).all(axis=1)
     if feet is None:
-        joints = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(segments)))
-        moments = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(moved)))
+        codes = np.where(blind | plates_refused(data), DERIVED, MEASURED)[:, None]
+        joints, moments = np.tile(codes, (1, len(segments))), np.tile(codes, (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
     else:
         contacts = _contacts(feet, undeclared, unmarked)

@@ -29,7 +29,7 @@ from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
-from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.assignment import check_assigned, foot_loads
 from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
@@ -190,7 +190,8 @@ def _loads_of_feet(
     recording: Recording, initial: CalibratedModel, assigned: Mapping[str, str] | None
 ) -> FootLoads | None:
     """What each foot carries by feet and plates; None of a model that stands on its root."""
-    if not initial.feet:
+    if not initial.feet:  # it takes all plates together, and is told wrong names all the same
+        check_assigned(assigned or {}, recording, ("right", "left"))
         return None
     loads = foot_loads(
         recording, initial.ground, foot_markers(initial), assigned=assigned, others=list(initial.contacts)

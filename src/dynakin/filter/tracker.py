@@ -24,7 +24,7 @@ from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
-from dynakin.results.measures.sources import ABSENT, MEASURED
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from dynakin.results.records import NO_ESTIMATE
 from dynakin.settings.lag import ALL_FRAMES, LIVE_LAG_S, check_lag
 from dynakin.settings.model import QUANTITIES, Quantity
@@ -162,6 +162,8 @@ class Tracker:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
         sources = self._sources.moments(feet)[0]
+        if not self.calibrated.feet and self.verdicts[-1] != "accepted":
+            sources = np.maximum(sources, np.uint8(DERIVED))
         if report.tracking in NO_ESTIMATE:
             sources = np.full_like(sources, ABSENT)
         unseen = self._sources.unseen(self._sight.look(sample.time_s, markers), 1)[0]

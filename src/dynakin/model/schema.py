@@ -11,10 +11,11 @@ from collections.abc import Collection, Iterable
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from dynakin.model.mirroring import SUFFIXES, mirrored
 from dynakin.settings.strict import CoordinateName, Name, Strict, nearest
+from dynakin.units import GRAVITY_M_S2, gravity_problem
 
 Vector3 = Annotated[tuple[float, float, float], Field(description="three numbers")]
 LandmarkPair = tuple[str, str]
@@ -207,6 +208,12 @@ class Ground(Strict):
     fixed_within_m: Annotated[float, Field(gt=0.0)] | None = None
 
 
+def _on_earth(gravity: Vector3) -> Vector3:
+    if problem := gravity_problem(gravity):
+        raise ValueError(problem)
+    return gravity
+
+
 class ModelFile(Strict):
     """A whole model file."""
 
@@ -214,7 +221,7 @@ class ModelFile(Strict):
     name: Name
     description: str = ""
     planar: bool = False
-    gravity: Vector3 = (0.0, -9.80665, 0.0)
+    gravity: Annotated[Vector3, AfterValidator(_on_earth)] = (0.0, -GRAVITY_M_S2, 0.0)
     ground: Ground = Ground()
     lengths: Annotated[tuple[Length, ...], Field(max_length=_MOST)] = ()
     coordinates: Annotated[tuple[Coordinate, ...], Field(max_length=_MOST)]

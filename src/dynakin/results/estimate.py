@@ -38,6 +38,7 @@ class Estimate:
     variable                                                      dimensions                  unit
     ============================================================  ==========================  =====================
     coordinates, coordinates_sd                                   (time, coordinate)          rad or m
+    coupled_coordinates                                           (time, coupled_coordinate)  rad or m
     speeds, speeds_sd                                             (time, coordinate)          rad/s or m/s
     accelerations, accelerations_sd                               (time, coordinate)          rad/s2 or m/s2
     moments                                                       (time, coordinate)          N m or N

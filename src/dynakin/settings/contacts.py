@@ -12,8 +12,8 @@ from dynakin.settings.strict import Name, Strict, validate
 
 SEAT = "seat"
 """The contact that is known to push upwards, from below the pelvis."""
-TAKEN = ("right", "left", "residual")
-"""Names that the feet and the filter's residual have."""
+TAKEN = ("right", "left", "residual", "r", "l")
+"""Names that the feet and the filter's residual have, and those of the feet in columns of files."""
 
 
 class DeclaredContact(Strict):

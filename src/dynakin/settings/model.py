@@ -112,5 +112,8 @@ class OpenSimOptions(Strict, use_attribute_docstrings=True):
     marker_places: Literal["calibrated", "kept"] = "calibrated"
     """Whether the .osim's marker places are calibrated by the recording, or kept as the file has them, as OpenSim's
     inverse kinematics does: kept is better where they were fitted to this person and skeleton."""
+    feet: dict[Literal["right", "left"], str] = Field(default_factory=dict)
+    """Bodies on which the ground acts, { right = "RFoot", left = "LFoot" }, where neither names nor markers show them;
+    toes and what else hangs on them are part of the foot."""
     leave_out: tuple[str, ...] = ()
     """Markers of the file that are not measurements (regressed joint centres, say)."""

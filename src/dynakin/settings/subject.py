@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator, model_validator
 
 from dynakin.errors import ModelError
 from dynakin.settings.strict import Name, Strict, validate
@@ -55,6 +56,13 @@ Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 
+FARTHEST_M = 2.0
+"""From a segment's joint to a load's centre, and of a load's radius of gyration: a bar of 2.2 m with all of its weight
+at the ends has 1.1 m."""
+_EVEN = 1.01
+"""The largest moment of inertia over the sum of the others: 1 of a disc, and digits."""
+
+
 class CarriedLoad(Strict):
     """A rigid body of known mass that moves with a segment."""
 
@@ -68,6 +76,26 @@ class CarriedLoad(Strict):
     """Moments of inertia about its own centre, along the segment's axes; not given: all of it in one point."""
     name: Name = "load"
     """Its own name among the segments."""
+
+    @field_validator("place_m")
+    @classmethod
+    def _near(cls, place: Vector3) -> Vector3:
+        if (away := math.hypot(*place)) > FARTHEST_M:
+            raise ValueError(
+                f"found a place {away:.3g} m from the segment's joint, expected metres, {FARTHEST_M:g} at most"
+            )
+        return place
+
+    @model_validator(mode="after")
+    def _possible(self) -> CarriedLoad:
+        *others, largest = sorted(self.inertia_kg_m2)
+        if largest > _EVEN * sum(others) or largest > self.mass_kg * FARTHEST_M**2:
+            most = min(sum(others), self.mass_kg * FARTHEST_M**2)
+            raise ValueError(
+                f"inertia_kg_m2: found {', '.join(f'{v:g}' for v in self.inertia_kg_m2)}, expected the largest to be "
+                f"at most {most:g}: the sum of the others, and {FARTHEST_M**2:g} m^2 times its mass"
+            )
+        return self
 
 
 @dataclass(frozen=True)

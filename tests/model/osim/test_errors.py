@@ -14,6 +14,7 @@ from support.osim.files import COUPLER, CUSTOM, small_model, transform, version_
 PIN = version_4("PinJoint", ("q",))
 CUSTOM_4 = version_4("CustomJoint", ("u", "v", "w"), transform(CUSTOM, 4), COUPLER)
 MARKER = PIN[PIN.index("<Marker ") : PIN.index("</Marker>")] + "</Marker>"
+INERTIA = "0.11 0.12 0.15 0.01 0.02 0.03"
 WRONG = {
     "unknown joint": (version_4("EllipsoidJoint", ("a", "b", "c")), 'EllipsoidJoint "tried": .*not supported'),
     "unknown joint, version 3": (version_3("EllipsoidJoint", ("a",)), 'EllipsoidJoint "tried": .*not supported'),
@@ -50,6 +51,14 @@ WRONG = {
     "a coupler of nothing": (CUSTOM_4.replace("names>v<", "names>z<"), "'z' is in no joint"),
     "a coupler of itself": (CUSTOM_4.replace("names>v<", "names>w<"), "circle"),
     "a coordinate twice": (PIN.replace('name="q"', 'name="base_rx"'), "'base_rx' is in two joints"),
+    "inertia in kg mm2": (PIN.replace(INERTIA, "1e5 1.2e5 1.5e5 0 0 0"), 'Body "base".*1e.05.*radius of gyration'),
+    "negative inertia": (PIN.replace(INERTIA, "-0.13 0.03 0.14 0 0 0"), 'Body "base".*expected none below 0'),
+    "a negative principal moment": (PIN.replace(INERTIA, "0.11 0.12 0.15 0.3 0 0"), "expected none below 0"),
+    "no triangle": (PIN.replace(INERTIA, "0.01 0.02 0.15 0 0 0"), "at most the sum of the others \\(0.03\\)"),
+    "parallel axes": (
+        CUSTOM_4.replace('<axis>1 0 0</axis><PolynomialFunction', '<axis>0 0 -2</axis><PolynomialFunction'),
+        'CustomJoint "tried": found parallel rotation axes of u and v',
+    ),
     "a marker twice": (PIN.replace("</Marker>", "</Marker>" + MARKER), "already"),
     "a joint that hides": (
         PIN.replace("<BodySet>", '<components><WeldJoint name="x"/></components><BodySet>'),

@@ -62,6 +62,27 @@ class StartingState:
 
 
 @dataclass(frozen=True, eq=False)
+class Coupled:
+    """Coordinates that are functions of others.
+
+    Attributes:
+        spec: sliders in the ground, whose places are the values. kinds: name -> "rotation" or "translation", and the
+            coordinate that it follows.
+    """
+
+    spec: _core.ModelSpec
+    kinds: dict[str, tuple[str, str]]
+
+    def values(self, names: list[str], coordinates: Array) -> Array:
+        """(T, K) rad or m of the coupled ones, for coordinates (T, C) of these names."""
+        model = _core.Model(self.spec)
+        states = np.tile(model.initial_state(), (len(coordinates), 1))
+        states[:, : len(model.coordinate_names)] = coordinates[:, [names.index(n) for n in model.coordinate_names]]
+        places = _core.whole_body(model, np.ascontiguousarray(states))["joint_centres"]
+        return np.asarray(places[:, [model.segment_names.index(name) for name in self.kinds], 0])
+
+
+@dataclass(frozen=True, eq=False)
 class CalibratedModel(StartingState):
     """A model calibrated on one person, and the state from which the filter starts.
 
@@ -94,6 +115,7 @@ class CalibratedModel(StartingState):
         one_sided_joints: knees and ankles with a lateral marker alone: their centres lie half an adult's joint width
             inwards.
         joint_prior: how elements hang together at first; the others are independent.
+        coupled: coordinates of an OpenSim model that follow others, and are none of ``spec``.
     """
 
     spec: _core.ModelSpec
@@ -121,6 +143,7 @@ class CalibratedModel(StartingState):
     one_sided_joints: tuple[str, ...] = ()
     joint_prior: JointPrior | None = None
     contacts: dict[str, str] = field(default_factory=dict)
+    coupled: Coupled | None = None
 
     @property
     def weighed_kg(self) -> float:

@@ -1,8 +1,8 @@
-"""What calibrating an OpenSim model on a recording takes: mass, first frame, limits, which way it faces, its feet."""
+"""What calibrating an OpenSim model on a recording takes: mass, first frame, limits, which way it faces."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +26,6 @@ Array = npt.NDArray[np.float64]
 _MOST = 0.9  # a first frame shows at least this part of the markers of the fullest one
 _A_TURN = 1e-3  # rad: files write pi with few digits
 _APART_M, _LEVEL_M = 0.08, 0.03  # of markers that show which way a body points; of markers that lie side by side
-_FEET = ("calcn", "foot", "calc", "talus")  # bodies that stand on the ground, the first that a model has
 
 
 def limits_of(source: OpenSimModel) -> dict[str, Interval]:
@@ -55,18 +54,6 @@ def beyond_range(source: OpenSimModel, start: dict[str, float]) -> list[Message]
             "person faces.",
         )
     ]
-
-
-def refuse_other_gravity(source: OpenSimModel) -> None:
-    """
-    Raises:
-        ModelError: gravity is not along -Y.
-    """
-    x, y, z = source.gravity
-    if y >= 0.0 or abs(x) + abs(z) > 1e-9:
-        raise ModelError(
-            f"{source.path}: gravity is {x:g} {y:g} {z:g}, expected it along -Y (the ground frame of models)"
-        )
 
 
 def of_subject(
@@ -151,7 +138,7 @@ def reach_of(source: OpenSimModel) -> dict[str, float]:
     return found
 
 
-def facing_pairs(source: OpenSimModel, chosen: Sequence[tuple[Marker, str]]) -> FacingPairs:
+def facing_pairs(source: OpenSimModel, chosen: Sequence[tuple[Marker, str]], feet: Mapping[str, str]) -> FacingPairs:
     """Recorded markers that lie behind each other on feet and pelvis: bodies of OpenSim's models have X forward."""
 
     def on(body: str) -> list[tuple[float, float, str]]:
@@ -166,31 +153,17 @@ def facing_pairs(source: OpenSimModel, chosen: Sequence[tuple[Marker, str]]) -> 
         front = sorted((z, name) for x, z, name in places if places[-1][0] - x < _LEVEL_M)
         return [(back[0][1], front[0][1]), (back[-1][1], front[-1][1])]
 
-    feet = [pair for body in feet_of(source).values() for pair in ends(body)]
+    along = [pair for body in feet.values() for pair in ends(body)]
     pelvis = [pair for body in source.bodies if "pelvis" in body.name.casefold() for pair in ends(body.name)]
-    return FacingPairs((*feet, *DEFAULT_PAIRS.heel_toe), (*pelvis, *DEFAULT_PAIRS.pelvis))
+    return FacingPairs((*along, *DEFAULT_PAIRS.heel_toe), (*pelvis, *DEFAULT_PAIRS.pelvis))
 
 
-def foot_markers(source: OpenSimModel, chosen: Sequence[tuple[Marker, str]]) -> dict[str, list[str]]:
+def foot_markers(
+    source: OpenSimModel, chosen: Sequence[tuple[Marker, str]], feet: Mapping[str, str]
+) -> dict[str, list[str]]:
     """Side -> the recorded names of the markers on its foot, and on what hangs on that (toes)."""
     found = {}
-    for side, foot in feet_of(source).items():
+    for side, foot in feet.items():
         bodies = {foot} | {joint.child for joint in source.joints if joint.parent == foot}
         found[side] = [name for marker, name in chosen if marker.body in bodies]
     return found
-
-
-def feet_of(source: OpenSimModel) -> dict[str, str]:
-    """ "right" and "left" -> the body that stands on the ground, where the names say so."""
-    names = [body.name for body in source.bodies]
-    for word in _FEET:
-        pair = {
-            side: name
-            for side, ends in (("right", ("_r", "r_", "right")), ("left", ("_l", "l_", "left")))
-            for name in names
-            if word in name.casefold()
-            and any(name.casefold().endswith(e) or name.casefold().startswith(e) for e in ends)
-        }
-        if len(pair) == 2:
-            return pair
-    return {}

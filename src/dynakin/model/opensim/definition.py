@@ -19,16 +19,17 @@ from dynakin.model.opensim.calibrate import (
     beyond_range,
     estimated_bodies,
     facing_pairs,
-    feet_of,
     first_frame,
     foot_markers,
     limits_of,
     of_subject,
     reach_of,
-    refuse_other_gravity,
     refuse_too_few,
 )
+from dynakin.model.opensim.coupled import coupled_of
 from dynakin.model.opensim.description import OpenSimModel
+from dynakin.model.opensim.feet import feet_of
+from dynakin.model.opensim.person import person_of
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import moved_by, to_spec, unseen
@@ -39,6 +40,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.settings.model import Bounds, OpenSimOptions, Priors
 from dynakin.settings.strict import nearest, validate
 from dynakin.settings.subject import Subject
+from dynakin.units import gravity_problem
 
 _MODEL_M = 0.003
 """Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
@@ -119,11 +121,12 @@ class OpenSimDefinition:
             self.options,
             [note("calibration", text) for text in self.source.left_out],
         )
-        refuse_other_gravity(source)
         find = find_laboratory_frame if source.floating else find_ground_frame
         chosen, measured_by = sites(source, options.leave_out, recording)
-        on_feet = foot_markers(source, chosen)
-        frame = ground or find(recording, vertical=vertical, forward=forward, pairs=facing_pairs(source, chosen))
+        feet, found_by = feet_of(source, {str(side): body for side, body in options.feet.items()})
+        on_feet = foot_markers(source, chosen, feet)
+        pairs = facing_pairs(source, chosen, feet)
+        frame = ground or find(recording, vertical=vertical, forward=forward, pairs=pairs)
         messages += [note("ground", text) for text in frame.how]
         if options.scale_masses:
             source = of_subject(
@@ -131,7 +134,7 @@ class OpenSimDefinition:
             )
         else:
             messages.append(note("mass", f"Mass {source.mass:.2f} kg: the OpenSim file's."))
-        messages += [note("calibration", text) for text in measured_by]
+        messages += [note("calibration", text) for text in (*measured_by, *found_by)]
         if static is not None:
             messages.append(note("calibration", "The standing trial gives the mass only."))
         kept = options.marker_places == "kept"
@@ -212,13 +215,14 @@ class OpenSimDefinition:
             parts={},
             messages=tuple(messages),
             plan=None,
-            feet=feet_of(source),
+            feet=feet,
             foot_markers=on_feet,
             unmodelled_m=np.full(len(skin), _MODEL_M),
             skin_lasts=_SKIN_LASTS,
             dimensionless=frozenset(lengths),
             unmarked_kg=sum(bodies[name].mass for name in moved_by(source, lock)),
             held=dict.fromkeys(lock, "it moves no measured marker"),
+            coupled=coupled_of(source),
         )
 
 
@@ -234,7 +238,9 @@ def load_opensim(
     Raises:
         ModelError: the file or an option is wrong, or holds what is not supported; its place is named.
     """
-    source = read_osim(path)
+    source = person_of(read_osim(path))
+    if problem := gravity_problem(source.gravity):
+        raise ModelError(f"{source.path}: gravity: {problem}")
     given = {} if options is None else options.model_dump()
     chosen = validate(OpenSimOptions, given | fields, "OpenSim model")
     scales = scale_names(source, chosen.scale, share=chosen.share_sides)

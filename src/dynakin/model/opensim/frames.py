@@ -16,12 +16,17 @@ def read_offset(node: Node, translation: str, orientation: str) -> Offset:
 
 
 class Frames:
-    """Every frame of a version 4 model by its path: ground, bodies, and the offset frames in joints and bodies."""
+    """Every frame of a version 4 model by its path: ground, bodies, and the offset frames in joints and bodies.
+
+    Attributes:
+        markers: those that stand in bodies, frames and the model itself instead of the MarkerSet, with their paths.
+    """
 
     def __init__(self, model: Node) -> None:
         self._bodies = {f"/bodyset/{node.name}": node.name for node in model.objects("BodySet")}
         self._bodies |= {"/ground": GROUND}
         self._offsets: dict[str, Node] = {}
+        self.markers: list[tuple[str, Node]] = []
         for place, owners in (("bodyset", "BodySet"), ("jointset", "JointSet")):
             for owner in model.objects(owners):
                 self._collect(f"/{place}/{owner.name}", owner, ("frames", "components"))
@@ -33,6 +38,8 @@ class Frames:
     def _collect(self, base: str, owner: Node, lists: tuple[str, ...]) -> None:
         for name in lists:
             for node in owner.find(name) or ():
+                if node.tag == "Marker":
+                    self.markers.append((f"{base}/{node.name}", node))
                 if node.tag == "PhysicalOffsetFrame":
                     self._offsets[f"{base}/{node.name}"] = node
                     self._collect(f"{base}/{node.name}", node, ("components",))

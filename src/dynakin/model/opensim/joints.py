@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -35,6 +36,7 @@ SIMPLE: dict[str, tuple[tuple[Literal["rotation", "translation"], Vector], ...]]
     ),
 }
 JOINTS = ("CustomJoint", *SIMPLE)
+_PARALLEL = 1e-3  # sine of the angle between axes
 TRANSFORM_AXES = ("translation1", "translation2", "translation3", "rotation1", "rotation2", "rotation3")
 
 
@@ -70,6 +72,13 @@ def _custom(joint: Node, coordinates: set[str]) -> tuple[JointAxis, ...]:
             axes.append(JointAxis(_kind(name), UNITS[index % 3], None, (polynomial(0.0),)))
         else:
             axes.append(_transform_axis(joint, node, coordinates, UNITS[index % 3]))
+    for one, other in combinations([axis for axis in axes if not is_constant(axis.functions)], 2):
+        same = one.kind == other.kind and one.coordinate != other.coordinate
+        if same and np.linalg.norm(np.cross(one.direction, other.direction)) < _PARALLEL:
+            joint.fail(
+                f"found parallel {one.kind} axes of {one.coordinate} and {other.coordinate}; "
+                "expected axes in different directions. Correct axis in its SpatialTransform"
+            )
     return tuple(axes)
 
 

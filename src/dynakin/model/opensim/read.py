@@ -6,16 +6,23 @@ import re
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
+
 from dynakin.model.opensim.description import GROUND, Body, Coordinate, Coupler, Joint, Marker, Offset, OpenSimModel
 from dynakin.model.opensim.frames import Frames, read_offset
 from dynakin.model.opensim.functions import function_of, joined, polynomial, read_function
 from dynakin.model.opensim.joints import read_axes, read_coordinate
 from dynakin.model.opensim.xml_file import Node, read_xml
 from dynakin.settings.strict import nearest
+from dynakin.units import GRAVITY_M_S2
 
 _OLDEST = 20000  # before that, OpenSim 1's files are built otherwise
 _MOST = 1000  # bodies or joints: whole bodies with fingers and vertebrae have a fifth
 _ENTRIES = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_xz", "inertia_yz")
+_ROUNDED = 0.01  # of the largest principal moment: entries are written with few digits
+_UNEVEN = 2.0  # times the sum of the other two: toes of Rajagopal's model have 3.3, of 0.001 kg m^2
+_LIGHT_KG_M2 = 0.05  # a foot has less: what is light moves no moment by much
+_WIDEST_M = 1.0  # radius of gyration of a part of a person; a trunk with head and arms has 0.3
 _NOT_MECHANICS = {
     "ForceSet": "muscles and other forces",
     "ControllerSet": "controllers",
@@ -54,7 +61,7 @@ def read_osim(path: str | Path) -> OpenSimModel:
             model.fail(f"coordinate {name!r} is in two joints")
     couplers, said = _couplers(model, set(names))
     markers = _markers(model, Frames(model) if newer else None, {GROUND, *(body.name for body in bodies)})
-    gravity = model.numbers("gravity", 3, (0.0, -9.80665, 0.0))
+    gravity = model.numbers("gravity", 3, (0.0, -GRAVITY_M_S2, 0.0))
     return OpenSimModel(
         name=model.name or path.stem,
         path=path,
@@ -135,12 +142,11 @@ def _in_order(model: Node, joints: list[tuple[Node, Joint]], bodies: list[str]) 
 
 def _markers(model: Node, frames: Frames | None, bodies: set[str]) -> tuple[Marker, ...]:
     found: dict[str, Marker] = {}
-    for node in model.objects("MarkerSet"):
-        if node.tag != "Marker":
-            continue
+    nodes = [(f"/markerset/{node.name}", node) for node in model.objects("MarkerSet") if node.tag == "Marker"]
+    for path, node in [*nodes, *(frames.markers if frames is not None else ())]:
         x, y, z = node.numbers("location", 3)
         if frames is not None:
-            body, offset = frames.resolve(node, f"/markerset/{node.name}", "parent_frame")
+            body, offset = frames.resolve(node, path, "parent_frame")
             x, y, z = offset.then(Offset((x, y, z))).translation
         else:
             body = node.word("body")
@@ -177,9 +183,33 @@ def _body(node: Node) -> Body:
         entries = node.numbers("inertia", 6)
     else:
         entries = [node.number(name, 0.0) for name in _ENTRIES]
-    if mass == 0.0:
+    if mass > 0.0:
+        _refuse_impossible(node, mass, entries)
+    else:
         return Body(node.name, 0.0, (0.0, 0.0, 0.0), (0.0,) * 6)
     return Body(node.name, mass, (x, y, z), tuple(entries))
+
+
+def _refuse_impossible(node: Node, mass: float, entries: list[float]) -> None:
+    """
+    Raises:
+        ModelError: principal moments of inertia that no body of this mass has, where they are large enough to matter.
+    """
+    xx, yy, zz, xy, xz, yz = entries
+    low, middle, high = (float(v) for v in np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    size = float(np.sqrt(max(high, 0.0) / mass))
+    if min(xx, yy, zz) < 0.0 or low < -_ROUNDED * high:
+        expected = "none below 0"
+    elif high > _UNEVEN * (low + middle) and high > _LIGHT_KG_M2:
+        expected = f"the largest at most the sum of the others ({low + middle:.3g})"
+    elif size > _WIDEST_M and high > _LIGHT_KG_M2:
+        expected = f"at most {mass * _WIDEST_M**2:.3g} of {mass:g} kg, whose radius of gyration is {size:.3g} m"
+    else:
+        return
+    node.fail(
+        f"found principal moments of inertia {low:.4g}, {middle:.4g} and {high:.4g} kg m^2 about the centre of mass, "
+        f"expected {expected}. Correct its inertia (kg m^2, not kg mm^2)"
+    )
 
 
 def _couplers(model: Node, coordinates: set[str]) -> tuple[tuple[Coupler, ...], list[str]]:

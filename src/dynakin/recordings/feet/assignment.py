@@ -62,14 +62,18 @@ def foot_loads(
         ConfigError: `assigned` names a plate, foot or contact that there is not.
     """
     fixed = dict(assigned or {})
-    _check_assigned(fixed, recording, (*foot_markers, *others))
+    check_assigned(fixed, recording, (*foot_markers, *others))
     plates = [GroundPlate.of(plate, ground) for plate in recording.plates]
     contacts = foot_contacts(recording, ground, foot_markers, plates)
     forward = ground.vectors_to_ground(ground.forward)[[0, 2]]
     return _Assignment(recording, tuple(foot_markers), contacts, plates, fixed).loads(forward)
 
 
-def _check_assigned(fixed: dict[str, str], recording: Recording, bearers: tuple[str, ...]) -> None:
+def check_assigned(fixed: Mapping[str, str], recording: Recording, bearers: tuple[str, ...]) -> None:
+    """
+    Raises:
+        ConfigError: plates are given, by name, that the recording has not, or to what is none of the bearers.
+    """
     names = [plate.name for plate in recording.plates]
     for plate, foot in fixed.items():
         if plate not in names:

@@ -1,4 +1,4 @@
-"""``markers.trc``: the model's markers in the frame of ``coordinates.mot`` and the recording's unit."""
+"""``markers.trc``: the estimated markers in the frame of ``coordinates.mot`` and the recording's unit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _PER_METRE = {"m": 1.0, "mm": 1000.0}
 
 
 def laboratory_markers(estimate: Estimate) -> np.ndarray:
-    """Estimated markers (T, M, 3), m: where the model that ``coordinates.mot`` poses has them, in its frame.
+    """Estimated markers (T, M, 3), m, in the frame of ``coordinates.mot``: where skin has moved them.
 
     A planar model knows two axes only: its markers are given in the recording's own laboratory frame, with the third
     axis as measured. Where the marker was not measured such a point is not known in the laboratory and is NaN; its

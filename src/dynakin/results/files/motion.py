@@ -37,7 +37,7 @@ def moment_columns(estimate: Estimate) -> list[str]:
 
 
 def write_coordinates(estimate: Estimate, path: Path) -> None:
-    """``coordinates.mot``: degrees and metres, without coordinates that no marker shows."""
+    """``coordinates.mot``: degrees and metres, without coordinates that no marker shows, coupled ones last."""
     _write_motion(
         estimate, path, "Coordinates", "coordinates", "Rotations in degrees, translations in metres.",
     )  # fmt: skip
@@ -65,9 +65,28 @@ def _write_motion(estimate: Estimate, path: Path, title: str, variable: str, uni
     notes = [units, _frame(estimate)]
     if held:
         notes.append(f"Left out, because no marker shows them: {', '.join(held)}.")
-    values = _in_degrees(estimate, variable)[:, seen]
-    digits = DIGITS if variable == "coordinates" else DIGITS_OF_RATES
+    values, digits = _in_degrees(estimate, variable)[:, seen], DIGITS_OF_RATES
+    if variable == "coordinates":
+        digits = DIGITS
+        coupled, more = _coupled(estimate)
+        names, values = [*names, *coupled], np.hstack([values, more])
+        if coupled:
+            notes.append(f"Follow others by the model's couplers: {', '.join(coupled)}.")
+        if any(str(name).startswith("soft_tissue/") for name in estimate.data["element"].values):
+            notes.append("The markers of markers.trc lie where skin has moved them, not where the model has them.")
     write_storage(path, title, estimate.time, names, values, in_degrees=True, notes=notes, digits=digits)
+
+
+def _coupled(estimate: Estimate) -> tuple[list[str], np.ndarray]:
+    """Names and values (T, K), degrees or m, of the coordinates that follow others, but for those of held ones."""
+    if "coupled_coordinates" not in estimate.data:
+        return [], np.empty((len(estimate.time), 0))
+    data = estimate.data
+    shown = ~np.isin(data["coupled_coordinate_follows"].values, list(estimate.held))
+    rotation = data["coupled_coordinate_type"].values == "rotation"
+    values = data["coupled_coordinates"].transpose("time", ...).values.astype(float, copy=True)
+    values[:, rotation] = np.degrees(values[:, rotation])
+    return [str(name) for name in data["coupled_coordinate"].values[shown]], values[:, shown]
 
 
 def _seen(estimate: Estimate) -> np.ndarray:

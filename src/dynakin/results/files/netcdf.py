@@ -21,6 +21,7 @@ from dynakin.results.measures.sources import MEANINGS
 
 _UNITS = {
     "coordinates": "rad or m, see coordinate_type",
+    "coupled_coordinates": "rad or m, see coupled_coordinate_type",
     "speeds": "rad/s or m/s, see coordinate_type",
     "accelerations": "rad/s2 or m/s2, see coordinate_type",
     "moments": "N m for rotations, N for translations",

@@ -18,6 +18,7 @@ from dynakin.arrays import runs
 from dynakin.recordings.feet.contact import SHARED_PLATE, UNMEASURED
 from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.naming import listed, sentence, words
+from dynakin.results.records import REFUSED
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,13 +99,21 @@ def contact_sources(contact: Codes, undeclared: npt.NDArray[np.bool_] | None = N
     return np.where(contact == SHARED_PLATE, PRIOR, codes).astype(np.uint8)
 
 
+def plates_refused(data: xr.Dataset) -> npt.NDArray[np.bool_]:
+    """(T,) frames whose plates were refused: no number of the estimate rests on them."""
+    if "verdict" not in data:
+        return np.zeros(data.sizes["time"], dtype=bool)
+    return np.asarray(values_of(data, "verdict")[:, -1] == REFUSED)
+
+
 def wrench_sources(data: xr.Dataset) -> Codes:
-    """(T, 6) of the estimated total wrench: derived from the motion alone where the plates do not measure it. How
-    contacts divide it does not matter, so no prior is in it."""
+    """(T, 6) of the estimated total wrench: derived from the motion alone where the plates do not measure it, or
+    were refused. How contacts divide it does not matter, so no prior is in it."""
     estimated = values_of(data, "wrench_estimated")
     codes = np.zeros(estimated.shape, dtype=np.uint8)
     if "wrench_measured" in data:
         codes[np.isnan(values_of(data, "wrench_measured"))] = DERIVED
+    codes[plates_refused(data)] = DERIVED
     codes[np.isnan(estimated)] = ABSENT
     return codes
 

@@ -137,6 +137,20 @@ def said(name: str) -> Said | None:
     return None
 
 
+def sided(name: str) -> tuple[str | None, str]:
+    """Side and rest of a name by its likeliest reading."""
+    return _readings(name)[0]
+
+
+def on_foot(name: str) -> str | None:
+    """The side of the foot on which a marker of this name lies; None where it says none."""
+    found = said(name)
+    if found is None or found.side not in ("right", "left"):
+        return None
+    segment = found.segment if found.place is None else anatomy()["places"][found.place].get("segment")
+    return found.side if segment in ("foot", "toes") else None
+
+
 def _readings(name: str) -> list[tuple[str | None, str]]:
     """Ways to part a name into a side and a rest, the likeliest first."""
     letters = unicodedata.normalize("NFKD", name.rsplit(":", 1)[-1].replace("ß", "ss"))
