@@ -17,6 +17,7 @@ from dynakin.identification.subject import Identification, identify_subject, war
 from dynakin.identification.trials import measure_all
 from dynakin.model.identified import IdentifiedSubject, read_identified, with_identified
 from dynakin.recordings.recording import Recording
+from dynakin.results.records import warnings_of
 from dynakin.simulation.trial import simulate
 from support.identification import Case, estimator
 
@@ -202,6 +203,44 @@ def test_warnings_of_the_calibration_are_part_of_what_is_found(case: Case, ident
     trial = replace(case.trials[0].movement, start=replace(doubtful, messages=("Warning: a leg is short.",)))
     said = warned(replace(case.common, initial=doubtful), [replace(case.trials[0], movement=trial)])
     assert said == ("Warning: another person.", f"Warning: {case.sims[0].recording.name}: a leg is short.")
+
+
+def pulled(recording: Recording, frames: slice) -> Recording:
+    """By a cable that bears 300 N in some frames, which no plate measures."""
+    plates = []
+    for plate in recording.plates:
+        force = plate.force.copy()
+        force[frames, 1] -= 300.0 / len(recording.plates)
+        plates.append(replace(plate, force=force))
+    return recording.with_plates(tuple(plates))
+
+
+def test_frames_in_which_plates_do_not_fit_the_motion_are_left_out_and_told(
+    case: Case, identified: Identification, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    doubted = pulled(case.sims[0].recording, slice(300, 500))
+    trial = case.common.with_plates(case.trials[0].movement, doubted)
+    left_out = np.isnan(trial.wrench).all(axis=1)
+    assert left_out[78:122].all() and left_out.mean() < 0.5
+    (said,) = warned(case.common, [trial])
+    assert said.startswith(f"Warning: {doubted.name}: the plates carry up to ") and "upwards than the motion" in said
+
+    subject = identified.subject.model_copy(update={"use": "bodies", "warnings": (said,)})
+    subject.write(file := tmp_path / "subject.toml")
+    assert read_identified(file) == subject
+    used = with_identified(case.common.initial, subject)
+    assert warnings_of(used.messages) == [
+        "Warning: the identified parameters come from trials that are doubted (1 warning in the subject file)."
+    ]
+    assert not warnings_of(with_identified(used, identified.subject).messages[len(used.messages) :])
+    assert main(["identify", "--compare", str(file), str(file)]) == 0
+    assert "the plates carry up to" in capsys.readouterr().out
+
+
+def test_a_trial_of_which_the_motion_leaves_no_second_is_refused(case: Case) -> None:
+    brief = case.sims[0].recording.window(0.0, 1.6)
+    with pytest.raises(RecordingError, match=r"fit the motion for 0\.\d+ s, expected 1 s or more: .*the plates carry up to"):
+        case.common.check(pulled(brief, slice(50, 120)))
 
 
 def mislabelled(recording: Recording) -> Recording:

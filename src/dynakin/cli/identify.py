@@ -134,5 +134,8 @@ def _compare(paths: list[Path]) -> None:
     if len(paths) != 2:
         raise ConfigError(f"identify --compare: {len(paths)} files, expected two subject files (before, after)")
     before, after = (read_identified(path) for path in paths)
+    for path, subject in zip(paths, (before, after), strict=True):
+        for text in subject.warnings:
+            out().print(f"- {path}: {text}", style="yellow")
     for text in change_in_words(change_between(before, after), (before.mass_kg, after.mass_kg)):
         out().print(f"- {text}")

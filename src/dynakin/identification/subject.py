@@ -78,7 +78,8 @@ def identify_subject(
         mass_kg=common.initial.mass_kg,
         use=decision.use,
         trials=tuple(trial.movement.recording.name for trial in trials),
-        report=(*lost, *said, *in_words(decision, posterior, batch)),
+        report=(*lost, *in_words(decision, posterior, batch)),
+        warnings=said,
         held_out=HeldOut(
             parts=decision.folds,
             components=decision.components,
@@ -91,11 +92,11 @@ def identify_subject(
 
 
 def warned(common: Common, trials: Sequence[MeasuredTrial]) -> tuple[str, ...]:
-    """Warnings of the calibrations: first of the subject, then of trials what was not said before."""
+    """Warnings of the calibrations and the plates: first of the subject, then of trials what was not said before."""
     said = warnings_of(common.initial.messages)
-    for movement in (trial.movement for trial in trials):
-        mine = [text for text in warnings_of(movement.start.messages) if text not in said]
-        said += [f"{WARNING}{movement.recording.name}: {text.removeprefix(WARNING)}" for text in mine]
+    for trial in trials:
+        mine = [text for text in (*warnings_of(trial.movement.start.messages), *trial.doubts) if text not in said]
+        said += [f"{WARNING}{trial.movement.recording.name}: {text.removeprefix(WARNING)}" for text in mine]
     return tuple(said)
 
 

@@ -20,6 +20,7 @@ from dynakin.errors import ModelError
 from dynakin.files import LARGEST_TEXT, read_bytes
 from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
 from dynakin.model.inertia import INERTIA_NAMES
+from dynakin.results.records import DOUBTED_SUBJECT, WARNING
 from dynakin.settings.strict import Strict, read_toml, validate
 
 _WIDE = 3.0  # standard deviations that bounds leave on both sides
@@ -87,7 +88,8 @@ class HeldOut(Strict):
 
 class IdentifiedSubject(Strict):
     """What was identified of one subject; ``use`` says whether cross-validation lets ``batch`` replace the table, and
-    ``held_out`` by how much it predicts better (not in files of earlier versions)."""
+    ``held_out`` by how much it predicts better (not in files of earlier versions); ``warnings`` what makes the trials
+    doubtful."""
 
     schema_version: Literal[1] = 1
     model: str
@@ -95,6 +97,7 @@ class IdentifiedSubject(Strict):
     use: Literal["table", "bodies"]
     trials: tuple[str, ...]
     report: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     held_out: HeldOut | None = None
     batch: Batch
 
@@ -264,7 +267,10 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
     spec.segments = segments
     found = JointPrior(subject.batch.names, covariance)
     gain = "" if subject.held_out is None else f"; {subject.held_out.in_words()}"
-    message = f"Identified inertial parameters are used, from {', '.join(subject.trials)}{gain}."
+    messages = [f"Identified inertial parameters are used, from {', '.join(subject.trials)}{gain}."]
+    if subject.warnings:
+        count = len(subject.warnings)
+        messages.append(f"{WARNING}{DOUBTED_SUBJECT} ({count} warning{'s' * (count > 1)} in the subject file).")
     return replace(
         initial,
         spec=spec,
@@ -273,5 +279,5 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
         lower=lower,
         upper=upper,
         joint_prior=found if initial.joint_prior is None else initial.joint_prior.with_known(found),
-        messages=(*initial.messages, message),
+        messages=(*initial.messages, *messages),
     )

@@ -12,6 +12,7 @@ from dynakin.results.measures.soft_tissue import marker_sites
 from dynakin.results.measures.sources import out_of_sight
 from dynakin.results.naming import listed, sentence, words
 from dynakin.results.records import (
+    DOUBTED_SUBJECT,
     LOW_PASSED,
     MISPLACED,
     NEVER_FLAT,
@@ -54,6 +55,7 @@ ADVICE = {
     "place": "Correct where the file has the plates (corners, origin, centres of pressure), or declare what else "
     "steadies the person (--contact).",
     "rate": "Look at which rate the cameras recorded, and whether the files say so.",
+    "identified": "Identify again on trials without a warning, or run without --parameters.",
     "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
 }
 
@@ -98,6 +100,7 @@ def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
         ("Low-passed markers", "low-passed", lambda text: text.startswith(LOW_PASSED)),
         ("Rate", "rate", lambda text: text.startswith(OFF_RATE)),
         ("Plates' place", "place", lambda text: text.startswith(OFF_PLACE)),
+        ("Identified parameters", "identified", lambda text: text.startswith(DOUBTED_SUBJECT)),
         ("Force plates", "plates", lambda text: "plate" in text),
         ("Recording", "recording", lambda text: True),
     ):
