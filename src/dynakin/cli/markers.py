@@ -10,6 +10,7 @@ import typer
 
 from dynakin.cli.console import out, table
 from dynakin.errors import ConfigError
+from dynakin.files import write_text
 
 markers = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Marker sets: built in, and one of your own.")
 
@@ -104,10 +105,7 @@ def new(
             "which the person stands still (the same set), or names that say more"
         )
     text = toml_text(guesses, output.stem, trial.name)
-    try:
-        output.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"{output}: cannot be written ({error.strerror})") from None
+    write_text(output, text, ConfigError)
     load_marker_set(output)
     console = out()
     used = [guess for guess in guesses if guess.place or guess.segment in anatomy()["clusters"]]

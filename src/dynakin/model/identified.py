@@ -4,7 +4,6 @@ constants of a run, which `dynakin live` takes too."""
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from pydantic import Field, model_validator
 from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.errors import ModelError
-from dynakin.files import LARGEST_TEXT, read_bytes
+from dynakin.files import LARGEST_TEXT, read_bytes, write_text
 from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.results.records import DOUBTED_SUBJECT, WARNING
@@ -107,14 +106,7 @@ class IdentifiedSubject(Strict):
         Raises:
             ModelError: the file cannot be written.
         """
-        temporary = path.with_name(f".{path.name}.{os.getpid()}")  # so that a file is whole, or the one before
-        try:
-            content = self.model_dump(mode="json", exclude_none=True)
-            temporary.write_text(tomli_w.dumps(content), encoding="utf-8")
-            temporary.replace(path)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            raise ModelError(f"{path}: cannot be written ({error.strerror})") from None
+        write_text(path, tomli_w.dumps(self.model_dump(mode="json", exclude_none=True)), ModelError)
 
 
 def read_identified(path: Path) -> IdentifiedSubject:
