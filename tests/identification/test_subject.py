@@ -187,6 +187,14 @@ def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(
     assert "in a folder that exists" in capsys.readouterr().err
 
 
+def test_a_mass_that_the_plates_contradict_is_named(case: Case) -> None:
+    lighter = replace(case.common, initial=replace(case.common.initial, mass_kg=66.0))
+    with pytest.raises(
+        RecordingError, match=r"the subject weighs 66\.0 kg .*: another mass \(--mass\), another person"
+    ):
+        lighter.check(case.sims[0].recording)
+
+
 def test_another_person_and_other_markers_are_named(case: Case) -> None:
     first = case.sims[0].recording
     child = simulate("sagittal7", "squat", 3, 5.0, height_m=1.4, mass_kg=70.0).recording

@@ -6,6 +6,7 @@ import gc
 from datetime import datetime
 from math import inf
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -154,7 +155,9 @@ def live(
     if session.failures or not session.measured:
         raise typer.Exit(1)
     if record is not None:
-        out().print(f"Recorded in {record}; results from it: dynakin live --finish {record} -o OUT", soft_wrap=True)
+        out().print(
+            f"Recorded in {record}; results from it: dynakin live --finish {quote(str(record))} -o OUT", soft_wrap=True
+        )
 
 
 def _estimated(parameters: Path) -> dict[str, tuple[float, float]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -131,4 +132,5 @@ def new(
             wants.setdefault(f"{need.landmark.replace('_', ' ')}: {in_words(need)}", []).append(side)
         words = "; ".join(f"{' and '.join(filter(None, sides))} {what}".strip() for what, sides in wants.items())
         console.print(f"Model {name} lacks {words}.", soft_wrap=True)
-    console.print(f"Next: look at {output}, then dynakin run {trial} --markers {output} -o OUT", soft_wrap=True)
+    command = f"dynakin run {quote(str(trial))} --markers {quote(str(output))} -o OUT"
+    console.print(f"Next: look at {output}, then {command}", soft_wrap=True)

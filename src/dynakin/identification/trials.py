@@ -223,13 +223,14 @@ class Common:
         if doubts and known_s < SHORTEST_S:
             raise RecordingError(
                 f"{where}: the plates fit the motion for {known_s:.2f} s, expected {SHORTEST_S:g} s or more: "
-                f"{' '.join(text.removeprefix(WARNING) for text in doubts)}"
+                f"{'; '.join(text.removeprefix(WARNING).rstrip('.') for text in doubts)}"
             )
         load, weighed = float(np.nanmean(wrench[:, 1])) / GRAVITY_M_S2, self.initial.weighed_kg
         if abs(load - weighed) > LOAD_APART * weighed:
             raise RecordingError(
                 f"{where}: its plates carry {load:.1f} kg on average, the subject weighs {weighed:.1f} kg (expected "
-                f"within {100.0 * LOAD_APART:.0f} %): another person, other plates, or a foot off the plates"
+                f"within {100.0 * LOAD_APART:.0f} %): another mass (--mass), another person, other plates, or a foot "
+                "off the plates"
             )
 
     def measured(self, recording: Recording, progress: Progress | None = None) -> MeasuredTrial:

@@ -195,7 +195,7 @@ class ModelDefinition:
         """As ``Definition.calibrate``: lengths and marker places from the first (or standing) frames, inertia from the
         table, coordinates from landmarks and, in space, markers."""
         asked = Asked(
-            self.model, self.subject, self.table, self.marker_set, self.functional,
+            self.model, self.path, self.subject, self.table, self.marker_set, self.functional,
             recording, static, side, vertical, forward, ground,
         )  # fmt: skip
         plan, rest = measure(asked)

@@ -217,7 +217,7 @@ def measured_wrench(
     warnings = warnings_of([*ground.notes, *([doubt] if doubt else [])])
     if not np.isfinite(wrench).all(axis=1).any():
         where = recording.path or recording.name
-        why = "".join(f"; {text.removeprefix(WARNING)}" for text in warnings)
+        why = "".join(f"; {text.removeprefix(WARNING).rstrip('.')}" for text in warnings)
         raise RecordingError(
             f"{where}: in no frame do the plates measure the whole wrench, expected a second of them{why}"
         )
