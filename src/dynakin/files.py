@@ -6,7 +6,9 @@ import csv
 import json
 import math
 import stat
-from collections.abc import Mapping, Sequence
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -85,13 +87,41 @@ def with_nulls(value: Any) -> Any:
     return value if math.isfinite(value) else None  # NumPy's numbers too, without loading it
 
 
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a name beside a file to write to; on success that takes the place of the file, on failure it goes."""
+    path = path.resolve()  # of a link, what it leads to
+    made = path.with_name(f".dynakin-{uuid.uuid4().hex[:8]}{path.suffix}")
+    try:
+        yield made
+        made.replace(path)
+    except OSError as error:
+        error.filename = error.filename and str(path)  # the name that people know
+        raise
+    finally:
+        made.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str, raises: type[DynakinError]) -> None:
+    """A whole file, UTF-8, or what was there before.
+
+    Raises:
+        ``raises``: the file cannot be written.
+    """
+    try:
+        with whole_file(path) as made:
+            made.write_text(text, encoding="utf-8", newline="\n")
+    except (OSError, RuntimeError) as error:
+        raise raises(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
+
+
 def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Rows of the same columns; what is None or no finite number is a blank cell, numbers keep all their digits.
 
     Raises:
         OSError: the file cannot be written.
     """
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with whole_file(path) as made, made.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(with_nulls(dict(row)) for row in rows)
@@ -104,4 +134,5 @@ def write_json(path: Path, content: Any) -> None:
         OSError: the file cannot be written.
     """
     text = json.dumps(with_nulls(content), indent=2, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+    with whole_file(path) as made:
+        made.write_text(text + "\n", encoding="utf-8", newline="\n")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -40,6 +41,21 @@ def test_what_is_there_and_what_run_would_do(data_dir: Path, capsys: Said) -> No
     assert "Marker set plug-in-gait" in found and "markers by name; next best" in found
     assert "--static S1_StandingRef.c3d (found next to the recording)" in found
     assert "Moments: absent in all 317 frames." in found  # the cable
+
+
+def test_a_file_of_the_model_that_is_wrong_is_wrong_input(tmp_path: Path, capsys: Said) -> None:
+    simulate("sagittal7", "squat", 1, 5.0).save(tmp_path / "squat")
+    trial = [str(tmp_path / "squat" / "markers.trc"), "--forces", str(tmp_path / "squat" / "forces.mot")]
+    (tmp_path / "set.toml").write_text("schema_version = 1\nunknown = 1\n")
+    text = files("dynakin.model.builtin").joinpath("sagittal7.toml").read_text()
+    (tmp_path / "model.toml").write_text(text.replace('name = "sagittal7"', 'name = "mine"\nunknown = 1'))
+    for option, file in (("--markers", "set.toml"), ("--model", "model.toml")):
+        assert main(["check", *trial, "--mass", "70", option, str(tmp_path / file)]) == 2
+        assert f"{file}: unknown key 'unknown'" in printed(capsys)[1]
+    own = (Path(__file__).parents[2] / "examples" / "03_own_model.toml").read_text()
+    (tmp_path / "model.toml").write_text(own.replace('between = ["knee", "hip"]', 'between = ["knee", "hipp"]'))
+    assert main(["check", *trial, "--mass", "70", "--model", str(tmp_path / "model.toml")]) == 1
+    assert "model.toml: length 'thigh': its landmarks knee and hipp are not measured" in printed(capsys)[1]
 
 
 @pytest.mark.parametrize(

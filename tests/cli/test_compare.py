@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from pathlib import Path
 
 import pytest
 
 from dynakin.cli.app import main
+from dynakin.cli.compare_inputs import cases_of
 from dynakin.simulation.output import save_trial
 from dynakin.simulation.trial import simulate_squat
 
@@ -24,6 +26,21 @@ def trial(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 
 SUBJECT = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75", "--sex", "male"]
+
+
+def test_a_horizon_that_cannot_be_is_refused_before_anything_runs(trial: list[str], capsys: Said) -> None:
+    assert main(["compare", *trial, *SUBJECT, "--unseen", "--horizon-ms", "-5"]) == 2
+    said = capsys.readouterr()
+    assert "the horizon is -0.005 s (--horizon-ms), expected more than 0 and less than half" in said.err
+    assert not said.out.strip()
+
+
+def test_trials_of_one_name_are_told_apart(trial: list[str], tmp_path: Path) -> None:
+    shutil.copytree(Path(trial[0]).parent, tmp_path / "other")
+    one, other = Path(trial[0]), tmp_path / "other" / "markers.trc"
+    cases = cases_of([one, other], [], [], 6.0, {"model": "sagittal7", "mass_kg": 70.0})
+    assert [case.recording.name for case in cases] == ["squat/markers", "other/markers"]
+    assert [case.recording.name for case in cases_of([one], [], [], 6.0, {})] == ["markers"]
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -84,7 +101,7 @@ def test_identified_on_one_trial_and_judged_on_another(trial: list[str], tmp_pat
     assert "judged from markers alone" in capsys.readouterr().out
     rows = rows_of(tmp_path / "out" / "held_out.csv")
     assert {row["quantity"] for row in rows} == {"fx", "fy", "mz"}
-    assert "markers → markers" in (tmp_path / "out" / "report.html").read_text()
+    assert "squat/markers → other/markers" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_a_configuration_may_stand_for_a_trial(trial: list[str], tmp_path: Path) -> None:

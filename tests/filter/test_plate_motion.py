@@ -277,7 +277,7 @@ def test_who_judges_takes_plates_in_step_too() -> None:
     whole = simulate("fullbody", "gait", 7, 4.0).recording
     late = brought_into_step(whole, -0.04)
     calibrated = person().prepare(whole).calibrated
-    there, before = measured_wrench(late, calibrated), measured_wrench(whole, calibrated)
+    (there, _), (before, _) = measured_wrench(late, calibrated), measured_wrench(whole, calibrated)
     both = np.isfinite(there).all(axis=1) & np.isfinite(before).all(axis=1)
     assert np.abs(there[both] - before[both])[:, :3].mean() < 2.0
 

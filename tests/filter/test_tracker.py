@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.errors import ModelError
+from dynakin.errors import ModelError, RecordingError
 from dynakin.simulation.trial import simulate_squat
 from support.squat_estimator import estimator, samples
 
@@ -85,3 +85,20 @@ def test_named_results_are_arrays_as_well(recording: dynakin.Recording) -> None:
     assert (step.coordinates == q).all() and step.coordinates[-1] == q[-1]
     assert np.array(step.coordinates, copy=True) is not q
     assert "knee" in repr(step.coordinates)
+
+
+def test_a_plate_that_a_sample_lacks_is_not_known(recording: dynakin.Recording) -> None:
+    """Not empty: the plates' sum would be half of the weight."""
+    whole = samples(recording)[:20]
+    unknown = {name: [np.nan] * 6 for name in whole[0].plates}
+    calibrated = estimator().calibrate(recording)
+    for start in (recording, calibrated):  # whose plates are known at once, or from the first sample on
+        one, other = estimator().start(start), estimator().start(start)
+        for k, sample in enumerate(whole):
+            first = dict(list(sample.plates.items())[: 1 if k else 2])
+            given = one.step(dataclasses.replace(sample, plates=first))
+            expected = other.step(sample if not k else dataclasses.replace(sample, plates=unknown))
+            np.testing.assert_array_equal(given.moments, expected.moments)
+    strange = dataclasses.replace(whole[0], plates={"FP1": [0.0] * 6})
+    with pytest.raises(RecordingError, match="plate 'FP1' is unknown, expected plate 1, plate 2, as in the recording"):
+        estimator().start(recording).step(strange)

@@ -15,7 +15,7 @@ from dynakin.identification.change import change_between, change_in_words
 from dynakin.identification.decision import Decision, decide, parts_of
 from dynakin.identification.subject import Identification, identify_subject, warned
 from dynakin.identification.trials import measure_all
-from dynakin.messages import note, warning
+from dynakin.messages import note, warning, warnings_of
 from dynakin.model.identified import IdentifiedSubject, read_identified, with_identified
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate
@@ -187,6 +187,14 @@ def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(
     assert "in a folder that exists" in capsys.readouterr().err
 
 
+def test_a_mass_that_the_plates_contradict_is_named(case: Case) -> None:
+    lighter = replace(case.common, initial=replace(case.common.initial, mass_kg=66.0))
+    with pytest.raises(
+        RecordingError, match=r"the subject weighs 66\.0 kg .*: another mass \(--mass\), another person"
+    ):
+        lighter.check(case.sims[0].recording)
+
+
 def test_another_person_and_other_markers_are_named(case: Case) -> None:
     first = case.sims[0].recording
     child = simulate("sagittal7", "squat", 3, 5.0, height_m=1.4, mass_kg=70.0).recording
@@ -204,6 +212,45 @@ def test_warnings_of_the_calibration_are_part_of_what_is_found(case: Case, ident
     trial = replace(case.trials[0].movement, start=replace(doubtful, messages=(short,)))
     said = warned(replace(case.common, initial=doubtful), [replace(case.trials[0], movement=trial)])
     assert said == (another, short.of(case.sims[0].recording.name))
+
+
+def pulled(recording: Recording, frames: slice) -> Recording:
+    """By a cable that bears 300 N in some frames, which no plate measures."""
+    plates = []
+    for plate in recording.plates:
+        force = plate.force.copy()
+        force[frames, 1] -= 300.0 / len(recording.plates)
+        plates.append(replace(plate, force=force))
+    return recording.with_plates(tuple(plates))
+
+
+def test_frames_in_which_plates_do_not_fit_the_motion_are_left_out_and_told(
+    case: Case, identified: Identification, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    doubted = pulled(case.sims[0].recording, slice(300, 500))
+    trial = case.common.with_plates(case.trials[0].movement, doubted)
+    left_out = np.isnan(trial.wrench).all(axis=1)
+    assert left_out[78:122].all() and left_out.mean() < 0.5
+    (said,) = warned(case.common, [trial])
+    assert said.level == "warning" and "upwards than the motion" in said.text
+    assert said.text.startswith(f"{doubted.name}: the plates carry up to ")
+
+    subject = identified.subject.model_copy(update={"use": "bodies", "warnings": (str(said),)})
+    subject.write(file := tmp_path / "subject.toml")
+    assert read_identified(file) == subject
+    used = with_identified(case.common.initial, subject)
+    assert list(map(str, warnings_of(used.messages))) == [
+        "Warning: the identified parameters come from trials that are doubted (1 warning in the subject file)."
+    ]
+    assert not warnings_of(with_identified(used, identified.subject).messages[len(used.messages) :])
+    assert main(["identify", "--compare", str(file), str(file)]) == 0
+    assert "the plates carry up to" in capsys.readouterr().out
+
+
+def test_a_trial_of_which_the_motion_leaves_no_second_is_refused(case: Case) -> None:
+    brief = case.sims[0].recording.window(0.0, 1.6)
+    with pytest.raises(RecordingError, match=r"the motion for 0\.\d+ s, expected 1 s or more: .*plates carry up to"):
+        case.common.check(pulled(brief, slice(50, 120)))
 
 
 def mislabelled(recording: Recording) -> Recording:

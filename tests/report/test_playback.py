@@ -13,8 +13,11 @@ import xarray as xr
 from dynakin.report.body import chain_of
 from dynakin.report.page import render_report
 from dynakin.report.playback import playback
+from dynakin.report.sections.section import Page
 from dynakin.report.styles import segment_colours
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.angles import angle_columns, with_angles
+from dynakin.results.measures.facing import facing
 from dynakin.results.measures.pressure import floor_height
 from support.estimates.synthetic import make_estimate
 from support.page import unpacked
@@ -38,6 +41,23 @@ def test_positions_in_the_page_are_the_estimates(jointed: Estimate, content: dic
     np.testing.assert_allclose(knee, 10.0 * np.array(content["time"]), atol=0.51)
     degrees = np.degrees(jointed.data["coordinates"].values[frames, :7])
     np.testing.assert_allclose(unpacked(arrays["angles"])[:, :7], degrees, atol=0.051)
+
+
+def test_angles_are_those_that_were_asked_for(jointed: Estimate) -> None:
+    asked = with_angles(jointed, {"knee": np.radians(5.0)}, "clinical")
+    page, (names, columns, _) = playback(asked), angle_columns(facing(asked))
+    content = json.loads(str(page.data))
+    frames = np.searchsorted(jointed.time, np.array(content["time"]) - 1e-6)
+    shown = unpacked(content["arrays"]["angles"])
+    rows = {row["title"]: row["columns"][""] for row in page.rows if row["shown"][0]}
+    for title, name in (("Knee", "knee_flexion"), ("Lumbar (+ flexion)", "trunk_flexion")):
+        np.testing.assert_allclose(shown[:, rows[title]], columns[frames, names.index(name)], atol=0.051)
+    assert page.note.startswith("Angles are those of angles.sto.")
+    (whole,) = (
+        each for each in Page(jointed, {}).curves if each.quantity == "lumbar" and each.method.startswith("EKF")
+    )
+    (turned,) = (each for each in Page(asked, {}).curves if each.quantity == "lumbar" and each.method.startswith("EKF"))
+    np.testing.assert_allclose(turned.mean, -whole.mean)
 
 
 def test_chain_joins_each_joint_to_the_next_and_the_last_to_its_farthest_marker(jointed: Estimate) -> None:

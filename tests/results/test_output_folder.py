@@ -28,6 +28,19 @@ def test_an_earlier_output_is_replaced(small: Estimate, tmp_path: Path) -> None:
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
+def test_a_link_to_a_folder_stays_one(small: Estimate, tmp_path: Path) -> None:
+    (tmp_path / "elsewhere" / "real").mkdir(parents=True)
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "elsewhere" / "real")
+    for _ in range(2):
+        Result(small).save(link)
+        assert link.is_symlink() and (tmp_path / "elsewhere" / "real" / "report.html").exists()
+    assert [entry.name for entry in (tmp_path / "elsewhere").iterdir()] == ["real"]
+    (tmp_path / "round").symlink_to(tmp_path / "round")
+    with pytest.raises(OutputError, match="cannot write results there"):
+        Result(small).save(tmp_path / "round")
+
+
 def test_overwriting_can_be_forbidden(small: Estimate, tmp_path: Path) -> None:
     Result(small).save(tmp_path / "out")
     with pytest.raises(OutputError, match="already holds results"):

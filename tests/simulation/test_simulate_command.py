@@ -27,6 +27,12 @@ def test_it_writes_what_the_api_writes(tmp_path: Path, capsys: pytest.CaptureFix
         assert (tmp_path / "cli" / name).read_bytes() == (tmp_path / "api" / name).read_bytes(), name
 
 
+def test_a_path_with_a_space_is_quoted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["simulate", "--duration", "5", "-o", str(tmp_path / "a b")]) == 0
+    said = capsys.readouterr().out
+    assert f"dynakin run '{tmp_path}/a b/markers.trc' --forces '{tmp_path}/a b/forces.mot' --model" in said
+
+
 def test_a_motion_from_its_own_truth(tmp_path: Path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
     assert main(["simulate", "--duration", "5", "-o", str(one)]) == 0

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dynakin.cli.app import main
 from dynakin.errors import OutputError, RecordingError
 from dynakin.filter.build import estimator_of
 from dynakin.recordings.recording import Recording
@@ -237,3 +238,40 @@ def test_a_recording_keeps_the_delay_and_the_person(tmp_path: Path) -> None:
     assert waited.subject == {"mass_kg": 61.5, "height_m": 1.66} and not_waited.subject == {}
     np.testing.assert_array_equal(waited.total_wrench(), source.recording.total_wrench())
     assert not np.array_equal(not_waited.total_wrench(), source.recording.total_wrench(), equal_nan=True)
+
+
+@pytest.mark.parametrize("magic", [False, True])
+def test_what_is_damaged_in_a_recording_is_missing_and_said(magic: bool, squat: Recording, tmp_path: Path) -> None:
+    record(squat, tmp_path / "r")
+    whole = (tmp_path / "r" / FILE).read_bytes()
+    assert recorded(tmp_path / "r").notes == ()
+    damaged = bytearray(whole)
+    at = whole.index(b"DKR1M", len(whole) // 2)
+    damaged[at if magic else at + 100] ^= 255
+    (tmp_path / "r" / FILE).write_bytes(damaged)
+    found = recorded(tmp_path / "r")
+    (lost,) = np.flatnonzero(np.isnan(found.markers).all(axis=(1, 2)))
+    np.testing.assert_allclose(found.time, squat.time, atol=1e-9)
+    kept = np.delete(np.arange(squat.n_frames), lost)
+    np.testing.assert_array_equal(found.markers[kept], squat.markers[kept])
+    assert np.isnan(found.plates[0].force[lost]).all()
+    (said,) = found.notes
+    assert said.level == "warning" and said.text.endswith("for it: 1.")
+    assert said.text.startswith(f"{tmp_path / 'r' / FILE} is damaged in 1 place (")
+    estimate = finish(tmp_path / "r", tmp_path / "out", {"mass_kg": 69.0}).estimate
+    assert said in estimate.messages and estimate.config["mass_kg"] == 69.0
+
+    (tmp_path / "r" / FILE).write_bytes(whole[: at + 50])  # a session that was killed loses its last moment
+    assert recorded(tmp_path / "r").notes == ()
+
+
+def test_options_that_change_nothing_are_refused_beside_finish(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for options, said in (
+        (["--finish", "r", "-o", "out", "--lag", "0"], "--lag changes nothing with --finish"),
+        (["--finish", "r", "-o", "out", "--port", "0"], "--port changes nothing with --finish"),
+        (["--source", "simulate:squat", "-o", "out"], "-o out goes with --finish"),
+    ):
+        assert main(["live", *options]) == 2
+        assert said in capsys.readouterr().err

@@ -48,7 +48,7 @@ def test_one_mask_feeds_and_judges(
     walk: Recording, estimator: Estimator, initial: CalibratedModel, known: np.ndarray
 ) -> None:
     _, fed = estimator.measured(walk, initial)
-    for wrench in (fed, measured_wrench(walk, initial), prepare(walk, estimator).wrench):
+    for wrench in (fed, measured_wrench(walk, initial)[0], prepare(walk, estimator).wrench):
         assert np.array_equal(np.isfinite(wrench).all(axis=1), known)
 
 
@@ -59,5 +59,5 @@ def test_frames_beside_the_plates_are_not_judged(walk: Recording, initial: Calib
     rows = judge(Blind(walk, initial, {"right where known": wrench}, ()), walk)
     assert {row.quantity for row in rows} == set(COMPONENTS)
     assert all(row.rms.mean == 0.0 for row in rows)
-    trial = _Trial(walk, initial, np.empty((walk.n_frames, 0, 3)), measured_wrench(walk, initial))
+    trial = _Trial(walk, initial, np.empty((walk.n_frames, 0, 3)), measured_wrench(walk, initial)[0])
     assert set(trial.wrench_errors("", "right where known", wrench).values()) == {0.0}

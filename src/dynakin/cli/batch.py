@@ -68,8 +68,8 @@ def batch(
         )
         console.print(as_table(table2_text(result.table2(), title, of=len(result.rows), doubted=result.doubted)))
     with stage("writing tables"):
-        write_batch(folder, result, identified)
-    console.print(f"Tables  {folder}/table2.csv, table2_subjects.csv, trials.csv, batch.json", soft_wrap=True)
+        written = write_batch(folder, result, identified)
+    console.print(f"Tables  {folder}/{', '.join(written)}", soft_wrap=True)
     for subject, row in identified.items():
         for text in (*row["doubts"], row["said"][-1]):
             console.print(f"Subject {subject}: {text}", soft_wrap=True)

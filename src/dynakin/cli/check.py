@@ -9,7 +9,7 @@ import typer
 
 from dynakin.cli.console import out
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
-from dynakin.errors import DynakinError, ModelError, RecordingError
+from dynakin.errors import ConfigError, DynakinError, ModelError, RecordingError
 from dynakin.files import is_file
 from dynakin.progress import stage
 
@@ -28,14 +28,20 @@ def check(
     with stage("loading"):
         from dynakin.cli.check_rows import model_rows, nearest_sets, recording_rows, rehearsed, to_add
         from dynakin.cli.prepared import print_rows
+        from dynakin.filter.build import estimator_of
         from dynakin.pipeline.stages import configure
         from dynakin.validation.case import case_of
 
     console = out()
     settings = configure(trial, given, {"output": Path()}, options=True)
+    estimator = None
     try:
         with stage("reading the recording"):
-            case = case_of(settings)
+            try:
+                estimator = estimator_of(settings)
+            except ModelError as error:  # of a file of the model, its markers or its table: wrong input, no refusal
+                raise ConfigError(error.message) from None
+            case = case_of(settings, estimator=estimator)
     except (RecordingError, ModelError) as error:
         named = (trial, settings.forces, settings.static)
         if not all(is_file(Path(file)) for file in named if file):

@@ -54,12 +54,15 @@ def compare(
         from dynakin.report.comparison_page import render_comparison
         from dynakin.validation.files import check_comparison_folder, save_comparison
         from dynakin.validation.methods import Trial
+        from dynakin.validation.unseen import check_horizon
 
     if output is not None:
         check_comparison_folder(output)
     chosen = chosen_trials(trials or [], identify_trial, test_trial, halved or not_seen)
     with stage("reading the recordings"):
         cases = cases_of(chosen, forces or [], preset or [], cutoff, given)
+    for case in cases if not_seen else []:
+        check_horizon(case.recording, horizon / 1000.0)
     console = out()
     tables: dict[str, Sequence[Any]] = {}
     more: dict[str, Any] = {"settings": settings_of(cases)}

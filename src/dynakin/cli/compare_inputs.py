@@ -8,6 +8,7 @@ from pathlib import Path
 
 from dynakin.cli.options import Given
 from dynakin.errors import ConfigError
+from dynakin.recordings.recording import Recording
 from dynakin.settings.settings import Settings, read_keys
 from dynakin.validation.case import Case, case_of
 from dynakin.validation.held_out import halves
@@ -65,7 +66,22 @@ def cases_of(
             "in the same order, or none"
         )
     files = [{"forces": force} for force in forces] or [{}] * len(trials)
-    return [_case(trial, given | file, presets, cutoff_hz, command) for trial, file in zip(trials, files, strict=True)]
+    cases = [_case(trial, given | file, presets, cutoff_hz, command) for trial, file in zip(trials, files, strict=True)]
+    names = told_apart([case.recording for case in cases])
+    return [
+        replace(case, recording=replace(case.recording, name=name)) for case, name in zip(cases, names, strict=True)
+    ]
+
+
+def told_apart(recordings: Sequence[Recording]) -> list[str]:
+    """Names of recordings; where several have one, with their folder before it."""
+    names = [recording.name for recording in recordings]
+    return [
+        f"{recording.path.parent.name}/{recording.name}"
+        if names.count(recording.name) > 1 and recording.path is not None
+        else recording.name
+        for recording in recordings
+    ]
 
 
 def _case(trial: Path, given: Given, presets: Sequence[str], cutoff_hz: float, command: str) -> Case:

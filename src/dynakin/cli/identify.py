@@ -102,17 +102,15 @@ def _check_output(output: Path) -> None:
 
 def _read(paths: list[Path], forces: list[Path], static: Path | None) -> tuple[list[Recording], Recording | None]:
     """The trials and the standing one, each with the ground forces given or found in its folder."""
+    from dynakin.cli.compare_inputs import told_apart
     from dynakin.recordings.read import read
 
     if forces and len(forces) != len(paths):
         raise ConfigError(f"identify: {len(forces)} force files for {len(paths)} trials, expected one a trial or none")
     chosen: list[Path | None] = [*forces] or [_forces_of(path) for path in paths]
     recordings = [read(path, force) for path, force in zip(paths, chosen, strict=True)]
-    names = [recording.name for recording in recordings]
-    recordings = [
-        recording if names.count(recording.name) == 1 else replace(recording, name=f"{path.parent.name}/{path.stem}")
-        for path, recording in zip(paths, recordings, strict=True)
-    ]
+    names = told_apart(recordings)
+    recordings = [replace(recording, name=name) for recording, name in zip(recordings, names, strict=True)]
     if static is None:
         return recordings, None
     same = [recording for path, recording in zip(paths, recordings, strict=True) if path.resolve() == static.resolve()]
@@ -134,5 +132,8 @@ def _compare(paths: list[Path]) -> None:
     if len(paths) != 2:
         raise ConfigError(f"identify --compare: {len(paths)} files, expected two subject files (before, after)")
     before, after = (read_identified(path) for path in paths)
+    for path, subject in zip(paths, (before, after), strict=True):
+        for text in subject.warnings:
+            out().print(f"- {path}: {text}", style="yellow")
     for text in change_in_words(change_between(before, after), (before.mass_kg, after.mass_kg)):
         out().print(f"- {text}")

@@ -6,6 +6,7 @@ import gc
 from datetime import datetime
 from math import inf
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 # Seconds of standing that are asked for, and how long they are waited for.
 _LIVE_STANDING_S, _REPLAY_STANDING_S = (2.0, 20.0), (2.0, 3.0)
+_HOST, _PORT = "127.0.0.1", 8080
 _SHORT_S, _SHORT_STANDING_S = 6.0, 0.4
 
 
@@ -66,10 +68,8 @@ def live(
         ),
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Show it as a web page.")] = False,
-    host: Annotated[str, typer.Option(help="Address of that page; 0.0.0.0: for everyone in the network.")] = (
-        "127.0.0.1"
-    ),
-    port: Annotated[int, typer.Option(help="Port of that page.")] = 8080,
+    host: Annotated[str, typer.Option(help="Address of that page; 0.0.0.0: for everyone in the network.")] = _HOST,
+    port: Annotated[int, typer.Option(help="Port of that page.")] = _PORT,
     record: Annotated[Path | None, typer.Option(help="Record what comes into this new folder.")] = None,
     publish: Annotated[str | None, typer.Option(help="Send estimates on: lsl[:NAME], or a plug-in's KIND:...")] = None,
     finish_folder: Annotated[
@@ -91,11 +91,24 @@ def live(
     if finish_folder is not None:
         if output is None:
             raise typer.BadParameter("--finish needs -o OUT, the folder for the results")
-        result = finish(finish_folder, output)
+        changed = {"--delay": delay != DELAY_S, "--host": host != _HOST, "--port": port != _PORT, "--view": view}
+        named: dict[str, object] = {
+            "--source": source,
+            "--forces": forces,
+            "--parameters": parameters,
+            "--record": record,
+        }
+        named |= {"--standing-wait": standing_wait, "--lag": lag, "--publish": publish}
+        changed |= {option: value is not None for option, value in named.items()}
+        for option in [option for option, given_too in changed.items() if given_too]:
+            raise typer.BadParameter(f"{option} changes nothing with --finish: leave it out")
+        result = finish(finish_folder, output, given)
         with result.failures.stage("summary"):
             print_summary(result, output)
         end(result)
         return
+    if output is not None:
+        raise typer.BadParameter(f"-o {output} goes with --finish; expected --record FOLDER, and --finish afterwards")
     if source is None:
         raise typer.BadParameter(
             "--source is missing, expected simulate:squat, replay:FILE, lsl:NAME, qtm:HOST or a plug-in's KIND:..."
@@ -142,7 +155,9 @@ def live(
     if session.failures or not session.measured:
         raise typer.Exit(1)
     if record is not None:
-        out().print(f"Recorded in {record}; results from it: dynakin live --finish {record} -o OUT", soft_wrap=True)
+        out().print(
+            f"Recorded in {record}; results from it: dynakin live --finish {quote(str(record))} -o OUT", soft_wrap=True
+        )
 
 
 def _estimated(parameters: Path) -> dict[str, tuple[float, float]]:

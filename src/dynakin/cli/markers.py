@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
 
 from dynakin.cli.console import out, table
 from dynakin.errors import ConfigError
+from dynakin.files import write_text
 
 markers = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Marker sets: built in, and one of your own.")
 
@@ -104,10 +106,7 @@ def new(
             "which the person stands still (the same set), or names that say more"
         )
     text = toml_text(guesses, output.stem, trial.name)
-    try:
-        output.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"{output}: cannot be written ({error.strerror})") from None
+    write_text(output, text, ConfigError)
     load_marker_set(output)
     console = out()
     used = [guess for guess in guesses if guess.place or guess.segment in anatomy()["clusters"]]
@@ -133,4 +132,5 @@ def new(
             wants.setdefault(f"{need.landmark.replace('_', ' ')}: {in_words(need)}", []).append(side)
         words = "; ".join(f"{' and '.join(filter(None, sides))} {what}".strip() for what, sides in wants.items())
         console.print(f"Model {name} lacks {words}.", soft_wrap=True)
-    console.print(f"Next: look at {output}, then dynakin run {trial} --markers {output} -o OUT", soft_wrap=True)
+    command = f"dynakin run {quote(str(trial))} --markers {quote(str(output))} -o OUT"
+    console.print(f"Next: look at {output}, then {command}", soft_wrap=True)

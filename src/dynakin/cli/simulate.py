@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -118,8 +119,8 @@ def _contents(trial: SimulatedTrial, folder: Path) -> Table:
 def _how_to_run(trial: SimulatedTrial, folder: Path) -> str:
     who = trial.truth.subject
     sex = f" --sex {who.sex}" if who.sex else ""
-    forces = f" --forces {folder / 'forces.mot'}" if trial.recording.plates else ""
+    forces = f" --forces {quote(str(folder / 'forces.mot'))}" if trial.recording.plates else ""
     return (
-        f"To estimate it: dynakin run {folder / 'markers.trc'}{forces} "
+        f"To estimate it: dynakin run {quote(str(folder / 'markers.trc'))}{forces} "
         f"--model {trial.settings['model']} --mass {who.mass_kg:g} --height {who.height_m:g}{sex} -o OUT"
     )

@@ -70,13 +70,14 @@ def grid(
     from dynakin.report.paper_figures.figures import save_sensitivity_figures
     from dynakin.studies.engine.journal import ROWS, Journal, open_folder
     from dynakin.studies.engine.pools import open_pool
-    from dynakin.studies.tuning.grid import belongs_to, run_grid
+    from dynakin.studies.tuning.grid import belongs_to, check_size, run_grid
     from dynakin.studies.tuning.in_words import criteria_text, grid_text
     from dynakin.studies.tuning.output import write_grid
 
     preset = given.pop("preset", None)
     cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune grid")
     axes = axes_of(vary or [], cases)
+    check_size(axes)
     base = preset or ("paper" if not vary and cases[0].config.grid is None else cases[0].config.preset)
     shared = shared_of(cases, base, left_out)
     folder = open_folder(output, ("grid.", "preset_", "figure3_"))

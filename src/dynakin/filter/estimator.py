@@ -171,7 +171,8 @@ class Estimator:
         if lag_s and not (rate_hz and np.isfinite(rate_hz)):
             raise ConfigError("lag_s: a lag needs the rate of the samples, expected rate_hz")
         calibrated = self.calibrate(source, static=static) if isinstance(source, Recording) else source
-        return Tracker(calibrated, self.noise, self.estimate, lag_frames(lag_s, rate_hz or 0.0))
+        plates = [plate.name for plate in source.plates] if isinstance(source, Recording) else []
+        return Tracker(calibrated, self.noise, self.estimate, lag_frames(lag_s, rate_hz or 0.0), plates)
 
     def run(
         self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,7 +24,8 @@ class Sample:
     Attributes:
         time_s: s.
         markers: name in the recording -> (3,) m; a marker that is missing is left out or NaN.
-        plates: plate -> (6,) wrench [N, N m], ground on person, about the laboratory origin; empty: not measured.
+        plates: plate -> (6,) wrench [N, N m], ground on person, about the laboratory origin. One that is left out, or
+            NaN, is not known, and then their sum is not; an empty plate has zeros.
     """
 
     time_s: float
@@ -83,8 +84,11 @@ def in_step(time: Array, wrench: Array, delay_s: float) -> Array:
     return np.stack([np.interp(time + delay_s, time, column) for column in wrench.T], axis=1)
 
 
-def sample_arrays(sample: Sample, initial: CalibratedModel) -> tuple[Array, Array]:
+def sample_arrays(sample: Sample, initial: CalibratedModel, known: Collection[str] = ()) -> tuple[Array, Array]:
     """Markers (M, 3) and total wrench (6,) of one live sample; what it lacks is NaN.
+
+    Args:
+        known: all plates that there are.
 
     Raises:
         RecordingError: a time, marker or plate that is not made of numbers in the expected shape, or is too large.
@@ -96,7 +100,8 @@ def sample_arrays(sample: Sample, initial: CalibratedModel) -> tuple[Array, Arra
     if not sample.plates:
         return np.ascontiguousarray(markers), np.full(6, np.nan)
     plates = [_numbers(plate, (6,), f"{where}: {name}", LARGEST_MOMENT_NM) for name, plate in sample.plates.items()]
-    total = np.sum(plates, axis=0)
+    complete = all(name in sample.plates for name in known)
+    total = np.sum(plates, axis=0) if complete else np.full(6, np.nan)
     return np.ascontiguousarray(markers), initial.ground.wrench_to_ground(total)
 
 

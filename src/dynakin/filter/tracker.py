@@ -54,6 +54,7 @@ class Tracker:
         calibrated: the model and where it starts.
         noise, estimate: as of `Estimator`.
         lag: frames by which `delayed` lies behind `step`; 0: there is none.
+        plates: names of all force plates; not given: those that samples have had so far.
 
     Attributes:
         calibrated: the same with the states that the noise asks for, as the filter has them.
@@ -64,10 +65,16 @@ class Tracker:
     """
 
     def __init__(
-        self, calibrated: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES, lag: int = 0
+        self,
+        calibrated: CalibratedModel,
+        noise: Noise,
+        estimate: Collection[Quantity] = QUANTITIES,
+        lag: int = 0,
+        plates: Collection[str] = (),
     ) -> None:
         self.calibrated, self.core_model, self._filter = core_filter(calibrated, noise, estimate)
-        self.noise, self.estimate, self.lag = noise, tuple(estimate), lag
+        self.noise, self.estimate, self.lag, self.plates = noise, tuple(estimate), lag, tuple(plates)
+        self._seen_plates = dict.fromkeys(plates)
         if lag:
             check_can_smooth(noise)
         self._lag = _core.FixedLag(self._filter, lag) if lag else None
@@ -82,11 +89,11 @@ class Tracker:
 
     def fresh(self) -> Tracker:
         """Another one, at the start of the same model."""
-        return Tracker(self.calibrated, self.noise, self.estimate, self.lag)
+        return Tracker(self.calibrated, self.noise, self.estimate, self.lag, self.plates)
 
     def changed(self, noise: Noise) -> Tracker:
         """Another one, at the start of the same model with other noise, which asks for the same states."""
-        return Tracker(self.calibrated, noise, self.estimate, self.lag)
+        return Tracker(self.calibrated, noise, self.estimate, self.lag, self.plates)
 
     @property
     def state(self) -> Array:
@@ -128,8 +135,9 @@ class Tracker:
     def step(self, sample: Sample, feet: ContactLoads | None = None) -> StepEstimate:
         """Take one sample; samples come in the order of their times.
 
-        The six rows of the wrench are the sum of the sample's plates. For a model with a floating root give plates
-        only where they carry all that the ground does to the person, as `dynakin.stream.Live` decides in each step.
+        The six rows of the wrench are the sum of the sample's plates; where one of them is left out, it is not known.
+        For a model with a floating root give plates only where they carry all that the ground does to the person, as
+        `dynakin.stream.Live` decides in each step.
 
         Args:
             feet: for models with a floating root: the feet's wrenches in this frame (T = 1). Moments, deviations and
@@ -143,7 +151,13 @@ class Tracker:
                 of `Sample`. ModelError: feet that do not fit the model.
             DivergenceError: the filter lost its estimate.
         """
-        markers, wrench = sample_arrays(sample, self.calibrated)
+        if strange := [name for name in sample.plates if self.plates and name not in self.plates]:
+            raise RecordingError(
+                f"sample at {sample.time_s} s: plate {strange[0]!r} is unknown, expected {', '.join(self.plates)}, as "
+                "in the recording of the start"
+            )
+        self._seen_plates |= dict.fromkeys(sample.plates)
+        markers, wrench = sample_arrays(sample, self.calibrated, self._seen_plates)
         dt = 0.0 if self._time is None else sample.time_s - self._time
         if dt < 0.0:
             raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")

@@ -18,12 +18,11 @@ from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.arrays import rms, wrench_about
 from dynakin.errors import RecordingError
-from dynakin.identification.trials import Common, MeasuredTrial
+from dynakin.identification.trials import SHORTEST_S, Common, MeasuredTrial
 from dynakin.identification.unknowns import Unknowns
 
 Array = npt.NDArray[np.float64]
 
-SHORTEST_S = 1.0  # of frames with the wrench, in one trial at least
 PASSES = 4  # linearised anew, and weights measured anew, at each
 FIRST_SIGMA = np.array([10.0, 20.0, 10.0, 10.0, 10.0, 10.0])
 """N, N m (fx ... mz): size of a model's error before anything is known of it."""

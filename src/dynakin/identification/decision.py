@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms, wrench_about
-from dynakin.identification.batch import SHORTEST_S, Posterior, at_start, identify_batch, known_s
-from dynakin.identification.trials import Common, MeasuredTrial, middle_of
+from dynakin.identification.batch import Posterior, at_start, identify_batch, known_s
+from dynakin.identification.trials import SHORTEST_S, Common, MeasuredTrial, middle_of
 from dynakin.identification.unknowns import Unknowns
 from dynakin.progress import Progress
 from dynakin.units import COMPONENTS

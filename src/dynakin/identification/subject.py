@@ -78,7 +78,8 @@ def identify_subject(
         mass_kg=common.initial.mass_kg,
         use=decision.use,
         trials=tuple(trial.movement.recording.name for trial in trials),
-        report=(*map(str, (*lost, *said)), *in_words(decision, posterior, batch)),
+        report=(*map(str, lost), *in_words(decision, posterior, batch)),
+        warnings=tuple(map(str, said)),
         held_out=HeldOut(
             parts=decision.folds,
             components=decision.components,
@@ -91,11 +92,11 @@ def identify_subject(
 
 
 def warned(common: Common, trials: Sequence[MeasuredTrial]) -> tuple[Message, ...]:
-    """Warnings of the calibrations: first of the subject, then of trials what was not said before."""
+    """Warnings of the calibrations and the plates: first of the subject, then of trials what was not said before."""
     said = warnings_of(common.initial.messages)
-    for movement in (trial.movement for trial in trials):
-        mine = [message for message in warnings_of(movement.start.messages) if message not in said]
-        said += [message.of(movement.recording.name) for message in mine]
+    for trial in trials:
+        own = (*warnings_of(trial.movement.start.messages), *trial.doubts)
+        said += [message.of(trial.movement.recording.name) for message in own if message not in said]
     return tuple(said)
 
 

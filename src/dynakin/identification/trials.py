@@ -13,6 +13,7 @@ from dynakin.bindings import _core
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.tracker import Tracker
+from dynakin.messages import Message
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.companions import another_person
@@ -34,6 +35,9 @@ LOAD_APART = 0.04
 """Part by which the mean load of a trial's plates may miss the body mass: a second of walking ends as fast as it began
 within 0.2 m/s, 2 % of gravity; other plates or another person miss by more."""
 
+
+SHORTEST_S = 1.0
+"""Seconds of frames with the plates' wrench: in one trial at least, and in each of which the plates are doubted."""
 
 SAME_PLACE_M = 1e-5
 """How far apart the markers of a trial and of its copy lie at most: files round to 1e-5 m or less."""
@@ -63,13 +67,14 @@ class MeasuredTrial:
 
     Attributes:
         wrench: (T, 6) N and N m about the ground origin; NaN: not known. unfiltered: (T, 6) the same, not low-passed.
-        floating: whether the body is fixed nowhere.
+        floating: whether the body is fixed nowhere. doubts: what a run would warn of its plates.
     """
 
     movement: Movement
     wrench: Array
     unfiltered: Array
     floating: bool = False
+    doubts: tuple[Message, ...] = ()
 
     @property
     def reference(self) -> Array:
@@ -87,12 +92,12 @@ class MeasuredTrial:
             lost=whole.lost[frames],
             unfiltered=whole.unfiltered[frames],
         )
-        return MeasuredTrial(kept, self.wrench[frames], self.unfiltered[frames], self.floating)
+        return replace(self, movement=kept, wrench=self.wrench[frames], unfiltered=self.unfiltered[frames])
 
     def full_band(self) -> MeasuredTrial:
         """The same movement as the smoother gives it and the plates as they measured: nothing is low-passed."""
         whole = self.movement
-        return MeasuredTrial(replace(whole, states=whole.unfiltered), self.unfiltered, self.unfiltered, self.floating)
+        return replace(self, movement=replace(whole, states=whole.unfiltered), wrench=self.unfiltered)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,25 +187,21 @@ class Common:
         lost = judged.lost[::every]
         return Movement(recording, recording.time[::every], states[::every], start, lost, unfiltered[::every])
 
-    def with_plates(self, movement: Movement, recording: Recording, *, as_measured: bool = False) -> MeasuredTrial:
-        """The movement with the plates of its recording; NaN in frames in which the person was lost.
-
-        Args:
-            as_measured: without the low-pass that the kinematics have: for judging.
+    def with_plates(self, movement: Movement, recording: Recording) -> MeasuredTrial:
+        """The movement with the plates of its recording; NaN in frames in which the person was lost, or in which the
+        plates do not fit the motion.
 
         Raises:
             RecordingError: it has none, or they are refused.
         """
-        measured = self._measured_wrench(recording, movement.start)
-        wrench = measured
-        if not as_measured:
-            first_of_second = movement.time[middle_of(len(movement.time))]
-            wrench = _low_passed(recording.time, wrench, int(np.searchsorted(recording.time, first_of_second - 1e-9)))
+        measured, doubts = self._measured_wrench(recording, movement.start)
+        first_of_second = movement.time[middle_of(len(movement.time))]
+        wrench = _low_passed(recording.time, measured, int(np.searchsorted(recording.time, first_of_second - 1e-9)))
         every = np.searchsorted(recording.time, movement.time - 1e-9)
         kept, unfiltered = (np.where(movement.lost[:, None], np.nan, w[every]) for w in (wrench, measured))
-        return MeasuredTrial(movement, kept, unfiltered, self.floating)
+        return MeasuredTrial(movement, kept, unfiltered, self.floating, tuple(doubts))
 
-    def _measured_wrench(self, recording: Recording, start: CalibratedModel) -> Array:
+    def _measured_wrench(self, recording: Recording, start: CalibratedModel) -> tuple[Array, list[Message]]:
         return measured_wrench(recording, start, self.estimator.plates, self.estimator.noise.plate_load_tolerance)
 
     def check(self, recording: Recording) -> None:
@@ -208,7 +209,8 @@ class Common:
 
         Raises:
             ModelError, RecordingError: its markers are others than the first trial's, or another person's; it has no
-                plates, they are refused, or they carry somebody of another mass.
+                plates, they are refused, they carry somebody of another mass, or what does not fit the motion leaves
+                less than a second of them.
         """
         where = recording.path or recording.name
         if other := another_person(recording, self.first):
@@ -216,12 +218,19 @@ class Common:
         if not recording.plates:
             raise RecordingError(f"{where}: no force plates, expected at least one; give its ground forces (--forces)")
         start = self._start(replace(recording, plates=()))
-        push = self._measured_wrench(recording, start)[:, 1]
-        load, weighed = float(np.nanmean(push)) / GRAVITY_M_S2, self.initial.weighed_kg
+        wrench, doubts = self._measured_wrench(recording, start)
+        known_s = np.isfinite(wrench).all(axis=1).sum() / recording.rate
+        if doubts and known_s < SHORTEST_S:
+            raise RecordingError(
+                f"{where}: the plates fit the motion for {known_s:.2f} s, expected {SHORTEST_S:g} s or more: "
+                f"{'; '.join(message.text.rstrip('.') for message in doubts)}"
+            )
+        load, weighed = float(np.nanmean(wrench[:, 1])) / GRAVITY_M_S2, self.initial.weighed_kg
         if abs(load - weighed) > LOAD_APART * weighed:
             raise RecordingError(
                 f"{where}: its plates carry {load:.1f} kg on average, the subject weighs {weighed:.1f} kg (expected "
-                f"within {100.0 * LOAD_APART:.0f} %): another person, other plates, or a foot off the plates"
+                f"within {100.0 * LOAD_APART:.0f} %): another mass (--mass), another person, other plates, or a foot "
+                "off the plates"
             )
 
     def measured(self, recording: Recording, progress: Progress | None = None) -> MeasuredTrial:

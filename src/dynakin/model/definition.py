@@ -195,7 +195,7 @@ class ModelDefinition:
         """As ``Definition.calibrate``: lengths and marker places from the first (or standing) frames, inertia from the
         table, coordinates from landmarks and, in space, markers."""
         asked = Asked(
-            self.model, self.subject, self.table, self.marker_set, self.functional,
+            self.model, self.path, self.subject, self.table, self.marker_set, self.functional,
             recording, static, side, vertical, forward, ground,
         )  # fmt: skip
         plan, rest = measure(asked)
@@ -286,6 +286,8 @@ def load_model(
     Raises:
         ModelError: an unknown name (the nearest is suggested), or a wrong file (file and key are named).
     """
+    if not isinstance(name_or_path, str | Path):
+        raise ModelError(f"load_model: found {name_or_path!r}, expected the name of a model or a file")
     name = str(name_or_path)
     if Path(name_or_path).suffix.casefold() == ".osim":
         if str(markers) != "auto":

@@ -4,7 +4,6 @@ constants of a run, which `dynakin live` takes too."""
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,8 +16,8 @@ from pydantic import Field, model_validator
 from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.errors import ModelError
-from dynakin.files import LARGEST_TEXT, read_bytes
-from dynakin.messages import note
+from dynakin.files import LARGEST_TEXT, read_bytes, write_text
+from dynakin.messages import note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.settings.strict import Strict, read_toml, validate
@@ -88,7 +87,8 @@ class HeldOut(Strict):
 
 class IdentifiedSubject(Strict):
     """What was identified of one subject; ``use`` says whether cross-validation lets ``batch`` replace the table, and
-    ``held_out`` by how much it predicts better (not in files of earlier versions)."""
+    ``held_out`` by how much it predicts better (not in files of earlier versions); ``warnings`` what makes the trials
+    doubtful."""
 
     schema_version: Literal[1] = 1
     model: str
@@ -96,6 +96,7 @@ class IdentifiedSubject(Strict):
     use: Literal["table", "bodies"]
     trials: tuple[str, ...]
     report: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     held_out: HeldOut | None = None
     batch: Batch
 
@@ -105,14 +106,7 @@ class IdentifiedSubject(Strict):
         Raises:
             ModelError: the file cannot be written.
         """
-        temporary = path.with_name(f".{path.name}.{os.getpid()}")  # so that a file is whole, or the one before
-        try:
-            content = self.model_dump(mode="json", exclude_none=True)
-            temporary.write_text(tomli_w.dumps(content), encoding="utf-8")
-            temporary.replace(path)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            raise ModelError(f"{path}: cannot be written ({error.strerror})") from None
+        write_text(path, tomli_w.dumps(self.model_dump(mode="json", exclude_none=True)), ModelError)
 
 
 def read_identified(path: Path) -> IdentifiedSubject:
@@ -265,7 +259,13 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
     spec.segments = segments
     found = JointPrior(subject.batch.names, covariance)
     gain = "" if subject.held_out is None else f"; {subject.held_out.in_words()}"
-    message = f"Identified inertial parameters are used, from {', '.join(subject.trials)}{gain}."
+    messages = [
+        note("calibration", f"Identified inertial parameters are used, from {', '.join(subject.trials)}{gain}.")
+    ]
+    if subject.warnings:
+        count = len(subject.warnings)
+        text = f"the identified parameters come from trials that are doubted ({count} warning{'s' * (count > 1)} in the"
+        messages.append(warning("identified", f"{text} subject file)."))
     return replace(
         initial,
         spec=spec,
@@ -274,5 +274,5 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
         lower=lower,
         upper=upper,
         joint_prior=found if initial.joint_prior is None else initial.joint_prior.with_known(found),
-        messages=(*initial.messages, note("calibration", message)),
+        messages=(*initial.messages, *messages),
     )

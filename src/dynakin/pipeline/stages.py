@@ -67,6 +67,11 @@ def run(
         DynakinError: anything that is wrong with the input, in one line. LostError: the person was lost, and
             ``keep_lost`` is false. What fails once the estimate is there is in ``Result.failures``.
     """
+    if not isinstance(trial, str | Path | Recording | Settings):
+        raise ConfigError(
+            f"run: trial is of type {type(trial).__name__}, expected a file, or a dynakin.Recording as dynakin.read "
+            "gives it"
+        )
     given = settings | {"model": None if model is None else str(model), "forces": forces, "output": output}
     if subject is not None:
         if not isinstance(subject, Subject):

@@ -20,6 +20,9 @@ FARTHEST_M = 1e4
 """Of a marker from the laboratory's origin: ten times the largest volume that is filmed (a ski slope)."""
 LARGEST_FORCE_N = 1e5
 """Of one plate: ten tonnes, ten times a landing of the heaviest athlete, and beyond what plates survive."""
+APART_M = 5.0
+"""Between the line of a plate's force by its moment and by its centre of pressure: as far as a laboratory is wide."""
+_LOADED_N = 20.0
 LARGEST_MOMENT_NM = 1e8
 """Of one plate, about the laboratory's origin: that force a kilometre away."""
 
@@ -76,6 +79,47 @@ def check_wrench(name: str, time: Array, force: Array, moment: Array, where: str
                 f"{where}: {name} at frame {k + 1} ({time[k]:g} s) has a {what} of {_listed(values[k])} {unit}, "
                 f"expected at most {most:g} {unit}: the value is damaged, or its unit wrong"
             )
+
+
+def check_place(name: str, time: Array, force: Array, moment: Array, cop: Array, where: str) -> None:
+    """A plate's moment (T, 3) N m about the laboratory's origin and its centre of pressure (T, 3) m say of its force
+    (T, 3) N that it acts in one place, within `APART_M`.
+
+    Raises:
+        RecordingError: they do not in most frames, as of moments in N mm; the first is named.
+    """
+    size = np.linalg.norm(force, axis=1)
+    with np.errstate(invalid="ignore"):
+        about = moment - np.cross(cop, force)  # the free moment, if they agree; what is across the force moves its line
+        across = np.linalg.norm(np.cross(about, force), axis=1)
+        loaded = np.flatnonzero((size > _LOADED_N) & np.isfinite(across))
+    away = across[loaded] / size[loaded] ** 2
+    apart = loaded[away > APART_M]
+    if 2 * len(apart) > len(loaded):
+        k = int(apart[0])
+        raise RecordingError(
+            f"{where}: {name} at frame {k + 1} ({time[k]:g} s) has a moment of {_listed(moment[k])} N m about the "
+            f"laboratory's origin, where its force and centre of pressure ask for {_listed(np.cross(cop, force)[k])} "
+            "N m; expected both in m and N m (moments in N mm are 1000 times too large)"
+        )
+
+
+def numbers(given: object, what: str) -> Array:
+    """An array, or lists made one, of real numbers.
+
+    Raises:
+        RecordingError: it is something else; ``what`` opens the message.
+    """
+    if isinstance(given, np.ma.MaskedArray):
+        raise RecordingError(f"{what} is a masked array, expected one with NaN where something is missing (filled)")
+    try:
+        found = np.asarray(given)
+    except ValueError:  # lists of different lengths
+        found = np.empty(0, dtype=object)
+    if found.dtype.kind not in "fiu":
+        kind = f"an array of {found.dtype}" if isinstance(given, np.ndarray) else f"a {type(given).__name__}"
+        raise RecordingError(f"{what} is {kind}, expected an array of numbers")
+    return np.asarray(found, dtype=float)
 
 
 def _beyond(values: Array, most: float) -> npt.NDArray[np.intp]:

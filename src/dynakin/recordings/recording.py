@@ -3,6 +3,8 @@ file."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +16,7 @@ import numpy.typing as npt
 from dynakin.arrays import wrench_about
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
-from dynakin.recordings.limits import check_markers, check_wrench
+from dynakin.recordings.limits import check_markers, check_place, check_wrench, numbers
 from dynakin.recordings.signals import AnalogChannel, Event
 
 Array = npt.NDArray[np.float64]
@@ -43,6 +45,10 @@ class Plate:
     free_moment: Array
     corners: Array | None = None
 
+    def __post_init__(self) -> None:
+        for key in ("force", "moment", "cop", "free_moment"):
+            object.__setattr__(self, key, numbers(getattr(self, key), f"{self.name}: {key}"))
+
     def frames(self, index: slice | npt.NDArray[Any]) -> Plate:
         """The same plate with only the frames of ``index``."""
         return replace(
@@ -52,6 +58,16 @@ class Plate:
             cop=self.cop[index],
             free_moment=self.free_moment[index],
         )
+
+
+def _tuple_of(given: Any, kind: type, where: str, what: str) -> tuple[Any, ...]:
+    """A tuple, or a list made one."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise RecordingError(f"{where} is {given!r}, expected a tuple of {what}")
+    found = tuple(given)
+    if wrong := [each for each in found if not isinstance(each, kind)]:
+        raise RecordingError(f"{where} holds {wrong[0]!r}, expected {what} only")
+    return found
 
 
 def rate_of(time: Array) -> float:
@@ -125,6 +141,14 @@ class Recording:
     analog: tuple[AnalogChannel, ...] = ()
 
     def __post_init__(self) -> None:
+        for key in ("time", "markers"):
+            object.__setattr__(self, key, numbers(getattr(self, key), f"{self.name}: {key}"))
+        for key, kind, what in (("marker_names", str, "names"), ("plates", Plate, "plates")):
+            object.__setattr__(self, key, _tuple_of(getattr(self, key), kind, f"{self.name}: {key}", what))
+        if twice := [name for name, count in Counter(self.marker_names).items() if count > 1]:
+            raise RecordingError(f"{self.name}: marker {twice[0]!r} is there more than once, expected each name once")
+        if self.time.ndim != 1:
+            raise RecordingError(f"{self.name}: time has shape {self.time.shape}, expected (T,)")
         expected = (len(self.time), len(self.marker_names), 3)
         if self.markers.shape != expected:
             raise RecordingError(f"{self.name}: markers have shape {self.markers.shape}, expected {expected}")
@@ -138,6 +162,7 @@ class Recording:
         check_markers(where, self.time, self.marker_names, self.markers)
         for plate in self.plates:
             check_wrench(plate.name, self.time, plate.force, plate.moment, where)
+            check_place(plate.name, self.time, plate.force, plate.moment, plate.cop, where)
 
     def __repr__(self) -> str:
         return (

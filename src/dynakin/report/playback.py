@@ -20,6 +20,7 @@ from dynakin.report.plot import INK, MEASURED
 from dynakin.report.sides import Joint, joints_of, normalising_mass
 from dynakin.report.styles import SIDE_COLOURS
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.angles import reported
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import centre_of_pressure, floor_height, support_height
 from dynakin.results.measures.sources import ABSENT, DERIVED, PRIOR, moment_sources, wrench_sources
@@ -109,7 +110,7 @@ def playback(estimate: Estimate) -> Playback:
     }
     curve, label = _curve(estimate)
     return Playback(
-        rows=[*_rows(joints, 2 if mass else 1), *([] if estimate.foot_names else _reaction_rows(arrays))],
+        rows=[*_rows(estimate, joints, 2 if mass else 1), *([] if estimate.foot_names else _reaction_rows(arrays))],
         views={} if planar else _VIEWS,
         curve=curve,
         curve_label=label,
@@ -123,9 +124,14 @@ def playback(estimate: Estimate) -> Playback:
         has_prior=any(bool((arrays[name] == PRIOR).any()) for name in _SOURCES),
         moment_unit="N m/kg" if mass else "N m",
         colours=key,
-        note="Moments of legs and arms are those of both sides together." if planar else "",
+        note=" ".join(_notes(estimate, planar)),
         data=Markup(json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")),
     )
+
+
+def _notes(estimate: Estimate, planar: bool) -> list[str]:
+    notes = ["Angles are those of angles.sto."] if reported(estimate).asked else []
+    return [*notes, *(["Moments of legs and arms are those of both sides together."] if planar else [])]
 
 
 def _seen(estimate: Estimate, points: Array) -> Array:
@@ -213,20 +219,22 @@ def _joint_values(estimate: Estimate, joints: list[Joint]) -> dict[str, Array]:
 
 
 def _degrees(estimate: Estimate) -> Array:
-    return np.asarray(estimate.values("coordinates") * np.where(estimate.is_rotation(), 180.0 / np.pi, 1000.0))
+    shown = reported(estimate).of(estimate.values("coordinates"))
+    return np.asarray(shown * np.where(estimate.is_rotation(), 180.0 / np.pi, 1000.0))
 
 
-def _rows(joints: list[Joint], moment_digits: int) -> list[dict[str, Any]]:
+def _rows(estimate: Estimate, joints: list[Joint], moment_digits: int) -> list[dict[str, Any]]:
     """A row a joint: the packed column of each side ("" stands across both), and (array, digits) below angle and
-    moment."""
+    moment. Where an angle grows against its name, the title says which way."""
     rows: list[dict[str, Any]] = []
-    at = 0
+    ways, at = reported(estimate).way, 0
     for joint in joints:
         columns = {side: at + k for k, side in enumerate(joint.columns)}
         at += len(columns)
         moment = None if joint.region == "Whole body" else ("moments", moment_digits)
         shown = (("angles", 1 if joint.rotation else 0), moment)
-        rows.append({"title": joint.title, "columns": columns, "shown": shown})
+        title = joint.title + ways[next(iter(joint.columns.values()))]
+        rows.append({"title": title, "columns": columns, "shown": shown})
     return rows
 
 

@@ -12,7 +12,7 @@ from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field
 
-from dynakin.settings.strict import Strict
+from dynakin.settings.strict import Called
 
 Quantity = Literal["lengths", "markers", "soft_tissue", "inertia"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
@@ -21,7 +21,7 @@ QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 Positive = Annotated[float, Field(gt=0.0)]
 
 
-class Priors(Strict, use_attribute_docstrings=True):
+class Priors(Called, use_attribute_docstrings=True):
     """Standard deviations of the state at the first frame."""
 
     renamed: ClassVar = {
@@ -79,7 +79,7 @@ class Priors(Strict, use_attribute_docstrings=True):
     """Inertia entries, of the moment izz about the joint: mostly m c^2, so as the mass."""
 
 
-class Bounds(Strict, use_attribute_docstrings=True):
+class Bounds(Called, use_attribute_docstrings=True):
     """Half widths of the bounds of (9)."""
 
     length_fraction: Positive = 0.20
@@ -96,7 +96,7 @@ class Bounds(Strict, use_attribute_docstrings=True):
     """Of the absolute value, as in (9)."""
 
 
-class OpenSimOptions(Strict, use_attribute_docstrings=True):
+class OpenSimOptions(Called, use_attribute_docstrings=True):
     """What of an OpenSim model can be estimated, and what is taken as the file has it."""
 
     scale: Literal["all"] | tuple[str, ...] | None = "all"

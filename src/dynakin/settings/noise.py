@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
-from dynakin.settings.strict import Strict
+from dynakin.settings.strict import Called
 
 NotNegative = Annotated[float, Field(ge=0.0)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=True)]  # infinite: as if there were no such measurement
@@ -29,7 +29,7 @@ def scale(default: float, unit: str, effect: str) -> Any:
     return Field(default=default, json_schema_extra={"unit": unit, "effect": effect})
 
 
-class Noise(Strict, use_attribute_docstrings=True):
+class Noise(Called, use_attribute_docstrings=True):
     """SI units; what is called a variance is squared. The defaults are those that anyone should use: white jerk, soft
     tissue as a process of its own, bounds by projection, gates, recovery; how each number was found stands in
     docs/validation.md."""

@@ -9,6 +9,7 @@ from typing import Any
 import tomli_w
 
 from dynakin.errors import ConfigError, OutputError
+from dynakin.files import write_text
 from dynakin.settings.noise import Noise
 from dynakin.settings.strict import nearest, read_toml
 
@@ -133,7 +134,4 @@ def write_preset(path: Path, noise: Noise, base: str, remarks: Sequence[str] = (
         k: v for k, v in noise.model_dump(mode="json", exclude={"adapt"}).items() if v is not None
     }
     text = "".join(f"# {line}\n" for line in remarks) + tomli_w.dumps({"base": base, "noise": values})
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
+    write_text(path, text, OutputError)

@@ -8,9 +8,11 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from types import UnionType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeVar, Union, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic.fields import FieldInfo
 
 from dynakin.errors import ConfigError, DynakinError, ModelError
 from dynakin.files import LARGEST_TEXT, read_bytes
@@ -69,6 +71,9 @@ class Strict(BaseModel):
     @classmethod
     def _refuse_unknown_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
+            for key, value in data.items():
+                if isinstance(value, bool) and _is_number(cls.model_fields.get(key)):
+                    raise ValueError(f"{key}: expected a number, found {value}")
             if old := [key for key in data if key in cls.renamed]:
                 called = [(key, *cls.renamed[key].partition(" ")) for key in old]
                 raise ValueError(
@@ -90,6 +95,48 @@ class Strict(BaseModel):
         """
         present = {name: getattr(self, name) for name in type(self).model_fields}
         return validate(type(self), present | values, type(self).__name__.lower(), ConfigError)
+
+
+def _is_number(field: FieldInfo | None) -> bool:
+    """Whether a field takes numbers and no truth values, which Python takes for 0 and 1."""
+    kinds = _kinds(field.annotation) if field else set()
+    return bool(kinds & {int, float}) and bool not in kinds
+
+
+def _kinds(annotation: Any) -> set[Any]:
+    """The types of a union, without what is annotated of them."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        return _kinds(get_args(annotation)[0])
+    if origin in (Union, UnionType):
+        return set().union(*(_kinds(each) for each in get_args(annotation)))
+    return {annotation}
+
+
+class _Called(type(BaseModel)):  # type: ignore[misc]
+    """Of classes that people call: what is wrong is a ConfigError, as it is from a file."""
+
+    def __call__(cls, *args: Any, **values: Any) -> Any:
+        try:
+            return super().__call__(*args, **values)
+        except ValidationError as error:
+            raise ConfigError(_first_error(error, values, cls.__name__.lower())) from None
+
+
+if TYPE_CHECKING:  # which finds the arguments in the fields, without a metaclass
+    _Base = Strict
+else:
+
+    class _Base(Strict, metaclass=_Called):
+        pass
+
+
+class Called(_Base):
+    """`Strict` that is made in Python as well.
+
+    Raises:
+        ConfigError: an unknown key, or a value that is wrong; the message names it.
+    """
 
 
 Schema = TypeVar("Schema", bound=BaseModel)
@@ -152,11 +199,15 @@ def validate(
     try:
         return schema.model_validate(data)
     except ValidationError as error:
-        found_errors = error.errors(include_url=False)
-        first = found_errors[0]
-        if first["type"] == "literal_error" and not isinstance(first["input"], str) and len(found_errors) > 1:
-            first = found_errors[1]  # "a word or a table", and it is a table: say what is wrong in that
-        place = _place(tuple(first["loc"]), data, names or {})
-        message = str(first["msg"]).removeprefix("Value error, ")
-        found = "" if first["type"] in {"value_error", "missing"} else f", found {first['input']!r}"
-        raise raises(f"{where}: {place + ': ' if place else ''}{message}{found}") from None
+        raise raises(_first_error(error, data, where, names)) from None
+
+
+def _first_error(error: ValidationError, data: Any, where: str, names: Mapping[str, str] | None = None) -> str:
+    found_errors = error.errors(include_url=False)
+    first = found_errors[0]
+    if first["type"] == "literal_error" and not isinstance(first["input"], str) and len(found_errors) > 1:
+        first = found_errors[1]  # "a word or a table", and it is a table: say what is wrong in that
+    place = _place(tuple(first["loc"]), data, names or {})
+    message = str(first["msg"]).removeprefix("Value error, ")
+    found = "" if first["type"] in {"value_error", "missing"} else f", found {first['input']!r}"
+    return f"{where}: {place + ': ' if place else ''}{message}{found}"

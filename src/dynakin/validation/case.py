@@ -8,6 +8,7 @@ from pathlib import Path
 
 from dynakin.errors import ConfigError
 from dynakin.filter.build import estimator_of
+from dynakin.filter.estimator import Estimator
 from dynakin.recordings.plates.loads import without_plate_loads
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
@@ -45,17 +46,18 @@ def case_of(
     *,
     recording: Recording | None = None,
     static: Recording | None = None,
+    estimator: Estimator | None = None,
 ) -> Case:
     """Read what a configuration names.
 
     Args:
         presets: to be compared; none: the configuration's own. cutoff_hz: of the reference methods.
-        recording, static: that were read before.
+        recording, static: that were read before. estimator: that was made of the configuration before.
 
     Raises:
         DynakinError: anything wrong with the input, in one line.
     """
-    common = estimator_of(config)
+    common = estimator or estimator_of(config)
     configs = {known_presets.title(name): config.changed(preset=name) for name in (presets or [config.preset])}
     setup = Setup(
         common,

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.total_wrench import known_ground
+from dynakin.filter.total_wrench import doubtful_mass, known_ground
 from dynakin.filter.tracker import Tracker, known_lag
-from dynakin.messages import Message, note
+from dynakin.messages import Message, note, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject
@@ -121,7 +121,7 @@ def identify_on(
         estimates[preset], tracker = estimator.track(recording, static=static, lag_s=0.0)
         _refuse_lost(estimates[preset], f"EKF ({preset})")
     initial = tracker.calibrated
-    wrench = measured_wrench(recording, initial, setup.common.plates, setup.plate_load_tolerance)
+    wrench, _ = measured_wrench(recording, initial, setup.common.plates, setup.plate_load_tolerance)
     ground = initial.ground if same_recording else None
     return IdentifyingTrial(recording, static, setup, initial, estimates, wrench, ground)
 
@@ -179,7 +179,7 @@ def judge(blind: Blind, recording: Recording) -> list[Row]:
     Raises:
         RecordingError: as `measured_wrench`.
     """
-    measured = measured_wrench(recording, blind.start, blind.plates, blind.tolerance)
+    measured, _ = measured_wrench(recording, blind.start, blind.plates, blind.tolerance)
     window = evaluation_window(recording.time)
     rows = []
     for k in np.flatnonzero(blind.start.spec.wrench_measured):
@@ -194,8 +194,9 @@ def measured_wrench(
     initial: CalibratedModel,
     plates: Mapping[str, str] | None = None,
     tolerance: float | None = None,
-) -> Array:
-    """The plates' total wrench (T, 6) N and N m about the ground origin; NaN where they do not measure all of it.
+) -> tuple[Array, list[Message]]:
+    """The plates' total wrench (T, 6) N and N m about the ground origin, NaN where they do not measure all of it, and
+    what a run would warn of.
 
     Args:
         plates, tolerance: plate -> foot, and how far the plates' mean may be from the weight, as for `known_ground`.
@@ -211,11 +212,16 @@ def measured_wrench(
         )
     wrench = initial.ground.wrench_to_ground(recording.total_wrench())
     markers = marker_paths(recording, initial, initial.ground)
-    _, wrench = known_ground(recording, initial, markers, wrench, plates, tolerance)
+    ground, wrench = known_ground(recording, initial, markers, wrench, plates, tolerance)
+    doubt = doubtful_mass(wrench, initial.weighed_kg, ground.load_ratio, initial.unseen_kg)
+    warnings = warnings_of([*ground.notes, *([doubt] if doubt else [])])
     if not np.isfinite(wrench).all(axis=1).any():
         where = recording.path or recording.name
-        raise RecordingError(f"{where}: in no frame do the plates measure the whole wrench, expected a second of them")
-    return wrench
+        why = "".join(f"; {message.text.rstrip('.')}" for message in warnings)
+        raise RecordingError(
+            f"{where}: in no frame do the plates measure the whole wrench, expected a second of them{why}"
+        )
+    return wrench, warnings
 
 
 def marker_paths(recording: Recording, initial: CalibratedModel, ground: GroundFrame) -> Array:

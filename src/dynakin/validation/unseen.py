@@ -71,6 +71,20 @@ def unseen(trials: Sequence[Figures]) -> list[UnseenRow]:
     ]
 
 
+def check_horizon(recording: Recording, horizon_s: float) -> None:
+    """Whether a trial can be predicted so far ahead.
+
+    Raises:
+        ConfigError: the horizon is not within it.
+    """
+    longest = 0.5 * float(recording.time[-1] - recording.time[0])
+    if not 0.0 < horizon_s < longest:
+        raise ConfigError(
+            f"{recording.path or recording.name}: the horizon is {horizon_s:g} s (--horizon-ms), expected more than 0 "
+            f"and less than half of the trial ({longest:g} s)"
+        )
+
+
 def unseen_figures(
     recording: Recording,
     setup: Setup,
@@ -91,8 +105,7 @@ def unseen_figures(
     Raises:
         ConfigError: the horizon is not within the trial. DynakinError: as `Estimator.run`.
     """
-    if not 0.0 < horizon_s < 0.5 * float(recording.time[-1] - recording.time[0]):
-        raise ConfigError(f"the horizon is {horizon_s:g} s, expected more than 0 and less than half of the trial")
+    check_horizon(recording, horizon_s)
     if setup.definition.floating:
         return figures_in_space(recording, setup, static=static, horizon_s=horizon_s, progress=progress)
     figures = plates_withheld(recording, setup, static=static)

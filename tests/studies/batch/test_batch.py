@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,23 @@ def test_a_batch_that_is_run_again_works_on_what_failed_only(study: Path, done: 
     assert main(["batch", str(study / "study.toml"), "--tables-only"]) == 1
     assert (study / "out" / "rows.jsonl").read_text() == lines
     assert (study / "out" / "table2.csv").read_text() == table
+
+
+def test_a_batch_that_was_moved_goes_on_where_it_lies(study: Path, done: int, tmp_path: Path) -> None:
+    shutil.copytree(study / "out", tmp_path / "moved")
+    lines = (study / "out" / "rows.jsonl").read_text()
+    assert main(["batch", str(study / "study.toml"), "--tables-only", "-o", str(tmp_path / "moved")]) == 1
+    assert (tmp_path / "moved" / "rows.jsonl").read_text() == lines
+
+
+def test_tables_that_are_not_there_are_not_announced(
+    study: Path, done: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (study / "study.toml").read_text().split("[[subjects]]")[0]
+    text += f'[[subjects]]\nname = "one"\nfolder = "{study}/S3"\ntrials = "squat_2/markers.trc"\nmass_kg = 70.0\n'
+    (tmp_path / "one.toml").write_text(text)
+    assert main(["batch", str(tmp_path / "one.toml")]) == 2
+    assert f"Tables  {tmp_path}/out/batch.json\n" in capsys.readouterr().out
 
 
 def test_results_of_each_trial_are_written(study: Path, tmp_path: Path) -> None:

@@ -77,6 +77,19 @@ def test_a_run_that_was_killed_goes_on_where_it_stopped(tmp_path: Path):
     assert Journal(path, SHARED).rows.keys() == {task.key for task in TASKS}
 
 
+def test_a_row_that_is_damaged_is_named_by_its_line(tmp_path: Path):
+    path = tmp_path / "rows.jsonl"
+    table("threads", journal=Journal(path, SHARED))
+    whole = path.read_bytes()
+    lines = whole.splitlines(keepends=True)
+    for bad in (b"\xff" + lines[3][1:], lines[3][:-5] + b"\n", b"[]\n"):
+        path.write_bytes(b"".join([*lines[:3], bad, *lines[4:]]))
+        with pytest.raises(OutputError, match=r"rows\.jsonl, line 4: is damaged.* delete that line"):
+            Journal(path, SHARED)
+    path.write_bytes(b"".join([*lines[:3], *lines[4:]]))
+    assert len(Journal(path, SHARED).rows) == len(TASKS) - 1
+
+
 def test_rows_of_something_else_are_not_taken(tmp_path: Path):
     path = tmp_path / "rows.jsonl"
     table("threads", journal=Journal(path, SHARED))

@@ -188,6 +188,11 @@ def test_a_range_that_is_none_is_refused(name: str, span: tuple, expected: str) 
     ("options", "expected"),
     [
         (["--vary", "jerk_density_rad2_s5"], "--vary: found 'jerk_density_rad2_s5', expected NAME=FROM:TO:STEPS"),
+        (["--vary", "jerk_density_rad2_s5=1:1e4:100000000"], "100000000 steps, expected at most 1000000"),
+        (
+            ["--vary", "jerk_density_rad2_s5=1:9:9999", "--vary", "force_variance_n2=1:9:9999"],
+            "combinations, expected at most 1000000",
+        ),
         (["--vary", "speed_variance=1:10:2"], "each once"),
         (["--backend", "dask"], "--scheduler ADDRESS"),
         (["--preset", "papr"], "preset 'papr' is unknown"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +51,7 @@ class Asked:
     """What is measured, and on what; attributes as in ``ModelDefinition`` and ``Definition.calibrate``."""
 
     model: ModelFile
+    path: Path
     subject: Subject
     table: BodyTable
     marker_set: MarkerSetFile | None
@@ -144,7 +146,7 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
                 "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors).",
             )
         )
-    unmeasured = _unmeasured_lengths(model, table, found.landmarks, height_m, messages)
+    unmeasured = _unmeasured_lengths(asked.path, model, table, found.landmarks, height_m, messages)
     geometry, posture = find_geometry(model, found.landmarks, locks, unmeasured)
     on_frames = (still.source, posture, still.frames)
     sites, placed = place_sites(marked.chosen, on_frames, still.trial, finder, geometry, model, marked.needed)
@@ -375,7 +377,12 @@ def _joint_widths(entries: list[Recording], finder: LandmarkFinder) -> tuple[dic
 
 
 def _unmeasured_lengths(
-    model: ModelFile, table: BodyTable, landmarks: dict[str, Array], height_m: float | None, messages: list[Message]
+    path: Path,
+    model: ModelFile,
+    table: BodyTable,
+    landmarks: dict[str, Array],
+    height_m: float | None,
+    messages: list[Message],
 ) -> dict[str, float]:
     found: dict[str, float] = {}
     for length in model.lengths:
@@ -384,7 +391,7 @@ def _unmeasured_lengths(
         part = table.parts.get(length.name)
         if part is None or part.length_per_height is None or height_m is None:
             raise ModelError(
-                f"length {length.name!r}: its landmarks {' and '.join(length.between)} are not measured, "
+                f"{path}: length {length.name!r}: its landmarks {' and '.join(length.between)} are not measured, "
                 f"and neither the table {table.name} nor the subject's height gives it"
             )
         found[length.name] = part.length_per_height * height_m

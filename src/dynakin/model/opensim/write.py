@@ -9,6 +9,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from dynakin.errors import OutputError
+from dynakin.files import write_text
 from dynakin.model.opensim.description import (
     GROUND,
     Body,
@@ -35,10 +36,7 @@ def write_osim(model: OpenSimModel, path: Path) -> None:
             polynomial of a function).
     """
     text = "\n".join(_indented(_document(model))) + "\n"
-    try:
-        path.write_text(text, encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
+    write_text(path, text, OutputError)
 
 
 def _document(model: OpenSimModel) -> Lines:

@@ -34,6 +34,11 @@ _KINDS = (
         "Scale the model to the person again, by a standing trial, or run without --model: fullbody measures its own.",
     ),
     _Kind(
+        "Identified parameters",
+        ("identified",),
+        "Identify again on trials without a warning, or run without --parameters.",
+    ),
+    _Kind(
         "Ankle angles",
         ("ankles",),
         "Give a standing trial (--static), or take these ankles' angles by their changes alone.",

@@ -13,6 +13,7 @@ from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from dynakin.files import whole_file
 from dynakin.progress import stage
 from dynakin.report.figure import FILE_STYLE
 
@@ -46,7 +47,8 @@ def _save(name: str, figure: Figure, folder: Path, formats: Sequence[str]) -> li
         with mpl.rc_context({**FILE_STYLE, "svg.hashsalt": name}):
             _lay_out(figure)
             for form in formats:
-                _print(figure, form, folder / f"{name}.{form}")
+                with whole_file(folder / f"{name}.{form}") as made:
+                    _print(figure, form, made)
                 written.append(folder / f"{name}.{form}")
     except Exception as error:  # one figure's is not the others'
         return error

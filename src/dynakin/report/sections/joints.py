@@ -11,7 +11,7 @@ from dynakin.report.labels import moment_note
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import REGIONS, Joint, joints_of, normalising_mass, side_key, side_lines
 from dynakin.report.styles import BAND, source_key
-from dynakin.results.measures.angles import convention_of
+from dynakin.results.measures.angles import convention_of, reported
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, UNKNOWN, moment_sources
 from dynakin.results.naming import listed, number, sentence
 
@@ -19,11 +19,10 @@ from dynakin.results.naming import listed, number, sentence
 def angle_section(page: Page) -> Section:
     """Coordinates with their bands of uncertainty."""
     estimate, lines_of = page.estimate, side_lines(page.estimate)
-    values, sd = estimate.values("coordinates"), estimate.values("coordinates_sd")
-    offset, clinical = np.zeros(values.shape[1]), False
+    sign, offset, _, asked = shown = reported(estimate)
+    values, sd = shown.of(estimate.values("coordinates")), estimate.values("coordinates_sd")
     about = "Each in the direction in which the model counts, from the model’s zero."
-    if "zero_offset" in estimate.data:
-        offset = estimate.data["zero_offset"].values
+    if asked:
         clinical = estimate.data.attrs["angle_signs"] == "clinical"
         zero = "from the standing zero" if np.any(offset) else "from the model’s zero"
         about = f"As in angles.sto: {zero}, {'clinical' if clinical else 'OpenSim’s'} signs."
@@ -32,10 +31,9 @@ def angle_section(page: Page) -> Section:
         factor, unit = (180.0 / np.pi, "deg") if joint.rotation else (1000.0, "mm")
         name = estimate.coordinate_names[next(iter(joint.columns.values()))]
         found = convention_of(name) if joint.rotation else None
-        sign = found[0].sign if clinical and found else 1
         ranges, lines = [], []
         for side, k in joint.columns.items():
-            own = sign * factor * (values[:, k] - offset[k])
+            own = factor * values[:, k]
             low, high = float(np.nanmin(own)), float(np.nanmax(own))
             band, wide = _band(own, factor * sd[:, k])
             lines.append(Line(own, lines_of[side].colour, 1.2, band))
@@ -43,7 +41,8 @@ def angle_section(page: Page) -> Section:
             ranges.append(f"{f'{side} ' if side else ''}{moved}{wide}")
         title = joint.title
         if found:
-            way = found[0].positive if sign == found[0].sign else found[0].negative
+            turned = sign[next(iter(joint.columns.values()))]
+            way = found[0].positive if turned == found[0].sign else found[0].negative
             title = f"{title} (+ {way})"
         least = 2.0 if joint.rotation else 10.0
         return chart(title, unit, estimate.time, lines[::-1], note="; ".join(ranges), least_range=least)

@@ -12,6 +12,7 @@ from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.styles import LineStyle, method_styles, source_key
 from dynakin.report.text_tables import table2_text
+from dynakin.results.measures.angles import reported
 from dynakin.results.measures.mean_curves import MEASURED
 from dynakin.results.measures.sources import moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
@@ -46,10 +47,11 @@ def methods_section(page: Page) -> Section | None:
     title = f"Difference to what was measured, {seconds[0]:g} to {seconds[-1]:g} s"
     rows = table2([trial])
     referred = trial.reference(AT) is not None
+    own = " Angles here are the model’s own, not those of angles.sto." if reported(page.estimate).asked else ""
     return Section(
         "methods",
         "Other methods",
-        f"{about_methods(trial)} {ABOUT_TABLE2}" if referred else "",
+        f"{about_methods(trial)} {ABOUT_TABLE2}{own}" if referred else "",
         tables=[table2_text(rows, title), table2_text(rows, "Every marker", single_markers=True)] if referred else [],
         notes=tuple(map(str, trial.notes)),
         parts=[part for make in PARTS if (part := make(trial, "methods")).panels] if referred else [],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import Joint, joints_of, side_key, side_lines
 from dynakin.report.styles import ESTIMATED_LINE, MEASURED_LINE, LineStyle, method_styles
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.angles import reported
 from dynakin.results.measures.mean_curves import MEASURED, PERCENT, MeanCurve
 from dynakin.results.measures.repetitions import Found
 from dynakin.results.naming import listed, sentence, words
@@ -34,7 +35,10 @@ class Plot:
 def repetition_section(page: Page) -> Section:
     """Of the page's estimate: in a plane by method, in space right and left together."""
     make = method_repetitions if page.planar else side_repetitions
-    return make(page.estimate, page.repetitions, page.curves)
+    made = make(page.estimate, page.repetitions, page.curves)
+    if not (made.parts and reported(page.estimate).asked):
+        return made
+    return replace(made, text=f"{made.text} Angles here are those of angles.sto; repetitions.csv has the model’s.")
 
 
 def side_repetitions(estimate: Estimate, found: Found, curves: Sequence[MeanCurve]) -> Section:
@@ -45,8 +49,9 @@ def side_repetitions(estimate: Estimate, found: Found, curves: Sequence[MeanCurv
         return Section("repetitions", "Repetitions", "", notes=(found.note,))
     joints = [joint for joint in joints_of(estimate) if joint.region in ("Legs", "Trunk and head")]
     by_quantity, styles = {(curve.side, curve.quantity): curve for curve in own}, side_lines(estimate)
-    angles = [_sides(joint, by_quantity, "", styles) for joint in joints]
-    moments = {joint.name.lower(): _sides(joint, by_quantity, "/moment", styles) for joint in joints}
+    ways = reported(estimate).way
+    angles = [_sides(joint, by_quantity, "", styles, ways) for joint in joints]
+    moments = {joint.name.lower(): _sides(joint, by_quantity, "/moment", styles, ways) for joint in joints}
     wrench = [curve for curve in curves if curve.quantity in COMPONENTS and curve.method.startswith(("EKF", MEASURED))]
     missing = [name for name, plot in moments.items() if plot is None]
     plots = {
@@ -161,7 +166,11 @@ def _in_order(group: Sequence[MeanCurve]) -> list[MeanCurve]:
 
 
 def _sides(
-    joint: Joint, curves: Mapping[tuple[str, str], MeanCurve], suffix: str, styles: Mapping[str, LineStyle]
+    joint: Joint,
+    curves: Mapping[tuple[str, str], MeanCurve],
+    suffix: str,
+    styles: Mapping[str, LineStyle],
+    ways: Sequence[str],
 ) -> Plot | None:
     drawn = []
     for side in joint.columns:
@@ -173,7 +182,8 @@ def _sides(
     if not any(curve.n.any() for _, curve in drawn):
         return None
     note = "; ".join(f"{f'{side}: ' if side else ''}{curve.times}" for side, curve in drawn)
-    return Plot(joint.title, note, [(styles[side], curve) for side, curve in drawn if curve.n.any()][::-1])
+    title = joint.title + ("" if suffix else ways[next(iter(joint.columns.values()))])
+    return Plot(title, note, [(styles[side], curve) for side, curve in drawn if curve.n.any()][::-1])
 
 
 def _panel(plot: Plot) -> Panel:

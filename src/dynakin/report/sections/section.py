@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
+
+import numpy as np
 
 from dynakin.report.chart import Panel
 from dynakin.report.labels import is_planar
 from dynakin.report.styles import LineStyle
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.angles import reported
 from dynakin.results.measures.mean_curves import MeanCurve, estimate_curves
 from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.validation.methods import Trial
@@ -41,8 +44,19 @@ class Page:
 
     @cached_property
     def curves(self) -> Sequence[MeanCurve]:
-        """Mean curves over the repetitions, of every method."""
-        return estimate_curves(self.estimate) if self.comparison is None else self.comparison.curves()
+        """Mean curves over the repetitions, of every method; angles as the page shows them all."""
+        found = estimate_curves(self.estimate) if self.comparison is None else self.comparison.curves()
+        shown = reported(self.estimate)
+        if not shown.asked:
+            return found
+        degrees = dict(zip(self.estimate.coordinate_names, np.degrees(shown.offset), strict=True))
+        sign = dict(zip(self.estimate.coordinate_names, shown.sign, strict=True))
+        return [
+            replace(curve, mean=sign[curve.quantity] * (curve.mean - degrees[curve.quantity]))
+            if curve.unit == "deg" and curve.quantity in sign
+            else curve
+            for curve in found
+        ]
 
 
 @dataclass(frozen=True)

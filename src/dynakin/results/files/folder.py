@@ -71,7 +71,7 @@ def check_output_writable(folder: str | Path, *, kind: FolderKind = RESULTS, ove
         _check_replaceable(folder, kind, overwrite)
     except OSError as error:
         raise OutputError(f"{folder}: cannot write results there ({error.strerror or error})") from error
-    _check_takes_files(folder, folder.absolute().parent)
+    _check_takes_files(folder, _target(folder).parent)
     return folder
 
 
@@ -92,6 +92,14 @@ def _named(folder: str | Path) -> Path:
     return expanded(folder)
 
 
+def _target(folder: Path) -> Path:
+    """Where a folder lies: of a link, what it leads to."""
+    try:
+        return folder.resolve()
+    except (OSError, RuntimeError) as error:  # a link that leads to itself
+        raise OutputError(f"{folder}: cannot write results there ({error})") from None
+
+
 def _check_takes_files(folder: Path, place: Path) -> None:
     """Whether the nearest folder that exists, from ``place`` upwards, can be written."""
     try:
@@ -107,14 +115,15 @@ def _check_takes_files(folder: Path, place: Path) -> None:
 @contextmanager
 def replacing(folder: Path, *, kind: FolderKind = RESULTS, overwrite: bool = True) -> Iterator[Path]:
     """Give a temporary sibling folder to fill; on success it takes the place of ``folder``, on failure it goes."""
-    folder = check_output_writable(folder, kind=kind, overwrite=overwrite).absolute()
+    folder = check_output_writable(folder, kind=kind, overwrite=overwrite)
+    target = _target(folder)
     made: Path | None = None
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        made = Path(tempfile.mkdtemp(prefix=".dynakin-", dir=folder.parent))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(prefix=".dynakin-", dir=target.parent))
         made.chmod(0o755)  # mkdtemp makes it private, results are ordinary files
         yield made
-        _swap(made, folder)
+        _swap(made, target)
         made = None
     except OSError as error:
         raise OutputError(f"{folder}: cannot write results there ({error.strerror or error})") from error

@@ -60,6 +60,7 @@ _STEPS = {"markers": 2.0**-20, "joint_centres": 2.0**-20, "joint_orientations": 
 """About 1 µm, 1e-6 of a direction's cosine, 1 mN and 1 mN m. Powers of two leave zeros at the end, which compress."""
 ONE_AT_A_TIME = Lock()
 """Who reads or writes by the netCDF library: it lets go of the interpreter, and does not bear a second thread."""
+_MORE_BYTES = 2**20
 _PARAMETER_NUMBERS = ("value", "sd", "initial", "table", "lower", "upper")
 
 
@@ -137,9 +138,22 @@ def write_netcdf(estimate: Estimate, path: Path) -> None:
                 encoding[key]["dtype"] = "float32"
             rounded[key] = variable.copy(data=values)
     # By its path xarray would ask Dask who else writes it, which takes 0.3 s where it is there.
-    with ONE_AT_A_TIME, netCDF4.Dataset(path, "w") as file:
-        store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
-        data.assign(rounded).dump_to_store(store, encoding=encoding)
+    try:
+        with ONE_AT_A_TIME, netCDF4.Dataset(path, "w") as file:
+            store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
+            data.assign(rounded).dump_to_store(store, encoding=encoding)
+    except (OSError, RuntimeError):
+        _raise_why(path)
+        raise
+
+
+def _raise_why(path: Path) -> None:
+    """Of a disk that is full the library says that permission was denied, or nothing; the system says it of a file of
+    that size."""
+    size = path.stat().st_size if path.exists() else 0
+    with path.open("wb") as file:
+        file.write(bytes(size + _MORE_BYTES))
+    path.unlink()
 
 
 def _rounded(name: str, values: np.ndarray, sd: np.ndarray | None) -> np.ndarray:

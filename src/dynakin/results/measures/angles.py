@@ -78,6 +78,34 @@ def with_angles(estimate: Estimate, zero: Mapping[str, float], signs: Signs) -> 
     return replace(estimate, data=data.assign_attrs(angle_signs=signs))
 
 
+class Reported(NamedTuple):
+    """How ``angles.sto`` shows each coordinate (C,): sign * (value - offset); as the model has it where no angles were
+    asked for, and what is no rotation ever. way: " (+ flexion)" of one that grows against its name, else "". asked:
+    whether they were."""
+
+    sign: Array
+    offset: Array
+    way: tuple[str, ...]
+    asked: bool
+
+    def of(self, coordinates: Array) -> Array:
+        """Coordinates (..., C), rad or m."""
+        return np.asarray(self.sign * (coordinates - self.offset))
+
+
+def reported(estimate: Estimate) -> Reported:
+    """Zero and signs that `with_angles` asked for."""
+    count = len(estimate.coordinate_names)
+    if "zero_offset" not in estimate.data:
+        return Reported(np.ones(count), np.zeros(count), ("",) * count, False)
+    found = [convention_of(name) for name in estimate.coordinate_names]
+    clinical = estimate.data.attrs["angle_signs"] == "clinical"
+    turned = zip(found, estimate.is_rotation(), strict=True)
+    sign = np.array([float(one[0].sign) if clinical and one and turns else 1.0 for one, turns in turned])
+    way = tuple(f" (+ {one[0].positive})" if one and s < 0.0 else "" for one, s in zip(found, sign, strict=True))
+    return Reported(sign, estimate.data["zero_offset"].values, way, True)
+
+
 def angle_columns(estimate: Estimate) -> tuple[list[str], Array, list[str]]:
     """Names, degrees (T, N) and a line on each of the joint angles that `with_angles` asked for: all rotations.
 
@@ -86,22 +114,21 @@ def angle_columns(estimate: Estimate) -> tuple[list[str], Array, list[str]]:
     from dynakin.results.measures.facing import facing
 
     estimate = facing(estimate)
-    values = np.degrees(estimate.values("coordinates"))
-    offset = np.degrees(estimate.data["zero_offset"].values)
+    sign, offset, *_ = shown = reported(estimate)
+    values = np.degrees(shown.of(estimate.values("coordinates")))
     clinical = estimate.data.attrs["angle_signs"] == "clinical"
     names, columns, lines = [], [], []
     for k in np.flatnonzero(estimate.is_rotation()):
         if estimate.coordinate_names[k] in estimate.held:
             continue
-        name, sign = estimate.coordinate_names[k], 1
+        name = estimate.coordinate_names[k]
         found = convention_of(name)
         line = f"{name}: as the model has it"
         if clinical and found is not None:
             convention, side = found
-            sign = convention.sign
             line = f"{convention.name}{side}: + {convention.positive}, - {convention.negative}"
             name = convention.name + side
         names.append(name)
-        columns.append(sign * (values[:, k] - offset[k]))
-        lines.append(f"{line}; zero at {sign * offset[k] + 0.0:.2f} deg of the model")
+        columns.append(values[:, k])
+        lines.append(f"{line}; zero at {np.degrees(sign[k] * offset[k]) + 0.0:.2f} deg of the model")
     return names, np.column_stack(columns) if columns else np.empty((len(values), 0)), lines

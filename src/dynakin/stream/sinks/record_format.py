@@ -2,8 +2,8 @@
 
 A record is b"DKR1", its kind (one byte), the payload's length and CRC-32 (unsigned, 4 bytes each, little-endian), then
 the payload. Kind J: JSON, in UTF-8. Kind M: a frame of markers, float64: arrival, time, positions (M x 3). Kind F:
-samples of plates, float64: arrival, number K, times (K), wrenches (K x P x 6). A record that was cut off, or damaged,
-is passed over.
+samples of plates, float64: arrival, number K, times (K), wrenches (K x P x 6). What a session that was killed cut off
+at the end is passed over; where something is damaged is told.
 """
 
 from __future__ import annotations
@@ -37,24 +37,37 @@ def packet_record(packet: Packet) -> bytes:
     return _record(b"F", _bytes([packet.arrived_s, float(len(time))], time, packet.wrenches))
 
 
-def read_records(path: Path) -> Iterator[dict[str, Any] | Packet]:
-    """Everything whole in the file, in its order.
+def read_records(path: Path) -> Iterator[dict[str, Any] | Packet | None]:
+    """Everything whole in the file, in its order; None where what lies between is damaged.
 
     Raises:
         RecordingError: the file cannot be read.
     """
     data = read_bytes(path)
-    at = data.find(_MAGIC)
+    at, end = data.find(_MAGIC), 0  # of the last whole record
     while 0 <= at <= len(data) - _HEAD.size:
         _, kind, length, checksum = _HEAD.unpack_from(data, at)
         payload = data[at + _HEAD.size : at + _HEAD.size + length]
-        if len(payload) == length and zlib.crc32(payload) == checksum:
-            if (content := _content(kind, payload)) is not None:
-                yield content
-            at += _HEAD.size + length
-            at = data.find(_MAGIC, at)
-        else:
+        whole = len(payload) == length and zlib.crc32(payload) == checksum
+        if not whole or (content := _content(kind, payload)) is None:
             at = data.find(_MAGIC, at + 1)
+            continue
+        if at > end:
+            yield None
+        yield content
+        end = at + _HEAD.size + length
+        at = data.find(_MAGIC, end)
+    rest = data[end:]
+    if rest and not _cut_off(rest):
+        yield None
+
+
+def _cut_off(rest: bytes) -> bool:
+    """Whether the end of a file is the beginning of one record."""
+    if len(rest) < _HEAD.size:
+        return rest[: len(_MAGIC)] == _MAGIC[: len(rest)]
+    magic, kind, length, _ = _HEAD.unpack_from(rest)
+    return bool(magic == _MAGIC and kind in (b"J", b"M", b"F") and len(rest) < _HEAD.size + length)
 
 
 def _content(kind: bytes, payload: bytes) -> dict[str, Any] | Packet | None:

@@ -7,14 +7,16 @@ import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from dynakin.errors import OutputError, RecordingError
+from dynakin.messages import warning
 from dynakin.pipeline.result import Result
 from dynakin.pipeline.stages import run_case
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
@@ -31,6 +33,7 @@ from dynakin.stream.start import recording_of
 from dynakin.validation.case import case_of
 
 FILE = "stream.dkr"
+_NAMED = 5  # holes whose times are said
 _CLOSE_S = 10.0  # for the last half second to reach the disk
 
 
@@ -139,9 +142,30 @@ def _why_ended(code: int) -> str:
     return os.strerror(code - SYSTEM_ERROR) if code > SYSTEM_ERROR else "the process that writes ended"
 
 
-def read_recorded(folder: str | Path) -> tuple[list[Fused], StreamInfo, StreamInfo | None, dict[str, Any]]:
-    """Samples of a recorded session, fused as they were live, its streams, and what it began with: "settings",
-    "subject" and "delay_s" (the last two are not in old recordings).
+class Hole(NamedTuple):
+    """The times of what is whole before and after something damaged, s."""
+
+    after_s: float
+    before_s: float
+
+
+class Recorded(NamedTuple):
+    """A recorded session.
+
+    Attributes:
+        samples: fused as they were live. begun: what it began with: "settings", "subject" and "delay_s" (the last two
+            are not in old recordings). holes: where the file is damaged.
+    """
+
+    samples: list[Fused]
+    markers: StreamInfo
+    plates: StreamInfo | None
+    begun: dict[str, Any]
+    holes: list[Hole]
+
+
+def read_recorded(folder: str | Path) -> Recorded:
+    """A recorded session.
 
     Raises:
         RecordingError: nothing was recorded there.
@@ -150,8 +174,15 @@ def read_recorded(folder: str | Path) -> tuple[list[Fused], StreamInfo, StreamIn
     fusion: Fusion | None = None
     begun: dict[str, Any] = {}
     found: list[Fused] = []
+    holes: list[Hole] = []
+    damaged, last_s = False, -np.inf
     for record in read_records(path):
-        if isinstance(record, MarkerPacket | PlatePacket):
+        if record is None:
+            damaged = True
+        elif isinstance(record, MarkerPacket | PlatePacket):
+            if damaged:
+                holes.append(Hole(last_s, float(np.min(record.time_s))))
+            damaged, last_s = False, float(np.max(record.time_s))
             if fusion is not None:
                 fusion.push(record)
                 found += fusion.poll(record.arrived_s)
@@ -165,33 +196,89 @@ def read_recorded(folder: str | Path) -> tuple[list[Fused], StreamInfo, StreamIn
             begun = begun or record
     if fusion is None:
         raise RecordingError(f"{path}: holds no recorded session")
-    return found + fusion.poll(np.inf), fusion.markers, fusion.plates, begun
+    if damaged:
+        holes.append(Hole(last_s, np.inf))
+    return Recorded(found + fusion.poll(np.inf), fusion.markers, fusion.plates, begun, holes)
 
 
 def recorded(folder: str | Path) -> Recording:
-    """A recorded session as a recording, laboratory frame.
+    """A recorded session as a recording, laboratory frame; frames that a damaged file has lost are missing.
 
     Raises:
         RecordingError: nothing was recorded there.
     """
-    found, markers, plates, begun = read_recorded(folder)
-    names = plates.names if plates else ()
-    return recording_of(found, markers.names, names, Path(folder).name, begun.get("subject"))
+    return _recording(read_recorded(folder), folder)
 
 
-def finish(folder: str | Path, output: str | Path) -> Result:
+def finish(folder: str | Path, output: str | Path, given: Mapping[str, Any] | None = None) -> Result:
     """Turn a recorded session into the usual output folder, as `dynakin run` makes it of a recording; late stages that
     failed are in its ``failures``.
+
+    Args:
+        given: settings in the place of those of the session.
 
     Raises:
         RecordingError: nothing was recorded there. Others: as `dynakin run`.
     """
     check_output_writable(Path(output))
-    settings = read_recorded(folder)[3]["settings"]
-    config = Settings.of(settings | {"trial": Path(folder), "output": Path(output)}, "live")
-    result = run_case(case_of(config, recording=recorded(folder)), keep=None)  # live has no option to keep it
+    found = read_recorded(folder)
+    settings = found.begun["settings"] | (given or {}) | {"trial": Path(folder), "output": Path(output)}
+    case = case_of(Settings.of(settings, "live"), recording=_recording(found, folder))
+    result = run_case(case, keep=None)  # live has no option to keep it
     result.save(output, check=False)
     return result
+
+
+def _recording(found: Recorded, folder: str | Path) -> Recording:
+    names = found.plates.names if found.plates else ()
+    subject = found.begun.get("subject")
+    made = recording_of(found.samples, found.markers.names, names, Path(folder).name, subject)
+    if not found.holes:
+        return made
+    filled = _with_lost_frames(made, 1.0 / found.markers.rate_hz, found.holes)
+    lost, count = filled.n_frames - made.n_frames, len(found.holes)
+    when = ", ".join(_when(hole) for hole in found.holes[:_NAMED])
+    when += f" and {count - _NAMED} more" * (count > _NAMED)
+    text = (
+        f"{Path(folder) / FILE} is damaged in {count} place{'s' * (count > 1)} ({when}): what was recorded "
+        f"there cannot be read; frames of markers that are missing for it: {lost}."
+    )
+    return replace(filled, notes=(*filled.notes, warning("recording", text)))
+
+
+def _when(hole: Hole) -> str:
+    if not np.isfinite(hole.after_s):
+        return f"before {hole.before_s:.2f} s"
+    return f"after {hole.after_s:.2f} s" if hole.before_s == np.inf else f"{hole.after_s:.2f} to {hole.before_s:.2f} s"
+
+
+def _with_lost_frames(recording: Recording, period_s: float, holes: Sequence[Hole]) -> Recording:
+    """With a frame of nothing at each time that the markers' rate asks for within a hole."""
+    time, lost = recording.time, list[float]()
+    for hole in holes:
+        for k in np.flatnonzero(np.diff(time) > 1.5 * period_s):
+            if time[k] < hole.before_s and time[k + 1] > hole.after_s:
+                count = round((time[k + 1] - time[k]) / period_s)
+                lost += np.linspace(time[k], time[k + 1], count + 1)[1:-1].tolist()
+    there = np.union1d(time, lost)
+    at = np.searchsorted(there, time)
+
+    def spread(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        wide = np.full((len(there), *values.shape[1:]), np.nan)
+        wide[at] = values
+        return wide
+
+    plates = tuple(
+        replace(
+            plate,
+            force=spread(plate.force),
+            moment=spread(plate.moment),
+            cop=spread(plate.cop),
+            free_moment=spread(plate.free_moment),
+        )
+        for plate in recording.plates
+    )
+    return replace(recording, time=there, markers=spread(recording.markers), plates=plates)
 
 
 def _fusion(record: Mapping[str, Any]) -> Fusion:

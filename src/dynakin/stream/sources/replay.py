@@ -119,8 +119,17 @@ def replay_source(address: str, options: dict[str, str]) -> Replay:
         duration = float(options["duration"]) if "duration" in options else None
     except ValueError:
         raise ConfigError(f"replay: found {options}, expected numbers for speed and duration") from None
-    loop = options.get("loop", "no") not in ("no", "0", "false")
+    loop = _is_set(options, "loop")
     return Replay(address, options.get("forces"), speed=speed, loop=loop, duration_s=duration)
+
+
+def _is_set(options: dict[str, str], key: str) -> bool:
+    """Whether an option is given that is a word alone, or is given as "yes"."""
+    words = {"yes": True, "1": True, "true": True, "no": False, "0": False, "false": False}
+    given = options.get(key, "no")
+    if given not in words:
+        raise ConfigError(f"{key} is {given!r}, expected {key} alone, or {key}=yes or {key}=no")
+    return words[given]
 
 
 _DURATION_S = 20.0
@@ -143,8 +152,7 @@ def simulate_source(address: str, options: dict[str, str]) -> Replay:
         duration = float(options["duration"]) if "duration" in options else None
     except ValueError:
         raise ConfigError(f"simulate: found {options}, expected numbers for seed, speed and duration") from None
-    motion = address or "squat"
+    loop, motion = _is_set(options, "loop"), address or "squat"
     length = duration if duration is not None else None if motion == "gait" else _DURATION_S
     trial = simulate(options.get("model", "fullbody"), motion, seed, length)
-    loop = options.get("loop", "no") not in ("no", "0", "false")
     return Replay(trial.recording, speed=speed, loop=loop)

@@ -131,8 +131,13 @@ def belongs_to(dataset: Dataset, options: Options, *, identify: bool = False) ->
         "--cutoff-hz": options.cutoff_hz,
         "results of single trials": options.files,
         "--identify": identify,
-        "trials": {s.name: s.content | {"files": _stamps(s.content)} for s in dataset.sessions},
+        "trials": {s.name: _but_output(s.content) | {"files": _stamps(s.content)} for s in dataset.sessions},
     }
+
+
+def _but_output(content: Mapping[str, Any]) -> dict[str, Any]:
+    """A folder of results may be moved."""
+    return {key: value for key, value in content.items() if key != "output"}
 
 
 FILES = ("trial", "forces", "static", "parameters", "model", "markers", "table", "preset")
@@ -171,12 +176,15 @@ def run_batch(
     return Batch(dataset.sessions, rows, failures)
 
 
-def write_batch(folder: Path, batch: Batch, identified: Mapping[str, Mapping[str, Any]] | None = None) -> None:
+def write_batch(folder: Path, batch: Batch, identified: Mapping[str, Mapping[str, Any]] | None = None) -> list[str]:
     """``table2.csv`` (over trials), ``table2_subjects.csv`` (over subjects), ``trials.csv`` (a row a trial, quantity
     and method, with the trial's findings) and ``batch.json`` (what failed and why, verdicts, notes, events, subjects).
 
     Args:
         identified: what came of `identify_subjects`.
+
+    Returns:
+        names of the files; tables without a row are not written.
 
     Raises:
         OutputError: a file cannot be written.
@@ -192,10 +200,10 @@ def write_batch(folder: Path, batch: Batch, identified: Mapping[str, Mapping[str
         for name, fits in batch.fits().items()
         for (quantity, method), fit in fits.items()
     ]
+    filled = {f"{name}.csv": rows for name, rows in tables.items() if rows}
     with writing(folder):
-        for name, rows in tables.items():
-            if rows:
-                write_csv(folder / f"{name}.csv", rows)
+        for name, rows in filled.items():
+            write_csv(folder / name, rows)
         write_json(
             folder / "batch.json",
             {
@@ -208,3 +216,4 @@ def write_batch(folder: Path, batch: Batch, identified: Mapping[str, Mapping[str
                 },
             },
         )
+    return [*filled, "batch.json"]

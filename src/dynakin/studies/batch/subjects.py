@@ -106,11 +106,13 @@ def with_parameters(dataset: Dataset, identified: Mapping[str, Mapping[str, Any]
     Args:
         identified: of `identify_subjects`.
     """
-    files = {subject: row["file"] for subject, row in identified.items() if row["use"] == "bodies"}
+    used = {subject for subject, row in identified.items() if row["use"] == "bodies"}
 
     def given(session: Session) -> Session:
-        file = files.get(session.subject)
-        return session if file is None else replace(session, content=session.content | {"parameters": file})
+        if session.subject not in used:
+            return session
+        file = dataset.output / session.subject / FILE  # where the folder lies now
+        return replace(session, content=session.content | {"parameters": str(file)})
 
     return replace(dataset, sessions=tuple(given(session) for session in dataset.sessions))
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from dynakin.errors import OutputError
-from dynakin.files import with_nulls
+from dynakin.files import read_bytes, with_nulls
 from dynakin.studies.engine.tasks import Row
 
 ROWS = "rows.jsonl"
@@ -76,15 +76,10 @@ class Journal:
     def _read(self) -> dict[str, Row]:
         if not self.path.exists():
             return {}
+        whole = read_bytes(self.path, OutputError).split(b"\n")[:-1]
         try:
-            text = self.path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise OutputError(f"{self.path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-        whole = [line for line in text.splitlines(keepends=True) if line.endswith("\n")]
-        try:
-            heading, *rows = [json.loads(line) for line in whole] or [None]
-            found = {row["key"]: row["row"] for row in rows}
-        except (ValueError, TypeError, KeyError):
+            heading = json.loads(whole[0]) if whole else None
+        except (ValueError, RecursionError):
             raise OutputError(f"{self.path}: is no journal of dynakin; name another folder") from None
         if heading is None:  # killed before its heading was whole
             self.path.unlink()
@@ -96,7 +91,17 @@ class Journal:
                 f"{self.path}: belongs to other settings, recordings or another version ({changed}); name another "
                 "folder, or remove it, and all is worked out again"
             )
-        kept = sum(len(line.encode()) for line in whole)
+        found: dict[str, Row] = {}
+        for number, line in enumerate(whole[1:], start=2):
+            try:
+                entry = json.loads(line)
+                found[entry["key"]] = entry["row"]
+            except (ValueError, TypeError, KeyError, RecursionError):
+                raise OutputError(
+                    f"{self.path}, line {number}: is damaged, expected a row of JSON; delete that line, and what it "
+                    "held is worked out again"
+                ) from None
+        kept = sum(len(line) + 1 for line in whole)
         with self.path.open("r+b") as file:
             file.truncate(kept)
         return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -48,6 +49,8 @@ def axis(name: str, low: float, high: float, steps: int) -> Axis:
         raise ConfigError(
             f"range of {name}: {low:g} to {high:g} in {steps} steps, expected 0 < from < to and 2 steps or more"
         )
+    if steps > MOST_CELLS:
+        raise ConfigError(f"range of {name}: {steps} steps, expected at most {MOST_CELLS}")
     exponents = np.linspace(np.log10(low), np.log10(high), steps)
     return Axis(name, tuple(float(f"{10.0**exponent:.12g}") for exponent in exponents))
 
@@ -104,6 +107,16 @@ class Grid:
         return [a.name for a in self.axes if len(a.values) > 1 and cell[a.name] in (a.values[0], a.values[-1])]
 
 
+def check_size(axes: Sequence[Axis]) -> None:
+    """
+    Raises:
+        ConfigError: more combinations than anyone can want.
+    """
+    cells = math.prod(len(axis.values) for axis in axes)
+    if cells > MOST_CELLS:
+        raise ConfigError(f"grid: {cells} combinations, expected at most {MOST_CELLS}")
+
+
 def combinations(axes: Sequence[Axis]) -> list[dict[str, float]]:
     """All settings, the last axis running fastest.
 
@@ -113,9 +126,7 @@ def combinations(axes: Sequence[Axis]) -> list[dict[str, float]]:
     names = [axis.name for axis in axes]
     if not names or len(set(names)) < len(names):
         raise ConfigError(f"grid: settings {', '.join(names) or 'none'}, expected at least one, each once")
-    cells = int(np.prod([len(axis.values) for axis in axes]))
-    if cells > MOST_CELLS:
-        raise ConfigError(f"grid: {cells} combinations, expected at most {MOST_CELLS}")
+    check_size(axes)
     return [dict(zip(names, values, strict=True)) for values in itertools.product(*(axis.values for axis in axes))]
 
 
