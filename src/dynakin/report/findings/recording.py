@@ -47,7 +47,7 @@ ADVICE = {
     "subject": "Give the mass and the height as measured (--mass, --height).",
     "scaling": "Scale the model to the person again, by a standing trial, or run without --model: fullbody measures "
     "its own.",
-    "ankles": "Give a standing trial (--static), or take these ankles' angles by their changes alone.",
+    "ankles": "Give a standing trial with flat feet (--static), or take these ankles' angles by their changes alone.",
     "upright": "Record the person standing upright with straight knees, and give that (--static).",
     "low-passed": "Export the markers without a filter (raw), and run them; of these use angles, and the moments of "
     "legs on plates.",
