@@ -14,10 +14,12 @@ import pytest
 import dynakin
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import RecordingError
+from dynakin.filter import plate_motion
 from dynakin.filter.parameters import DELAY_UNSEEN_S, parameters_of
 from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
 from dynakin.recordings.recording import Plate, Recording
-from dynakin.results.records import OFF_RATE
+from dynakin.recordings.resampling import low_pass
+from dynakin.results.records import CARRIED, OFF_RATE
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.held_out import measured_wrench
@@ -205,6 +207,45 @@ def test_plates_of_a_real_walk_off_their_place(data_dir: Path, by_m: float, told
     found = [text for text in estimator.run(shifted(walk, 0, by_m)).messages if "does not act" in text]
     assert len(found) == told
     assert not told or "(X +0.0" in found[0]
+
+
+def holding(recording: Recording, mass_kg: float) -> Recording:
+    """With the force of so much in both hands, half of it under each foot."""
+    own = [k for k, name in enumerate(recording.marker_names) if "wrist" in name]
+    at = low_pass(recording.markers[:, own].mean(axis=1), recording.rate, 6.0)
+    step = 1.0 / recording.rate
+    push = mass_kg * np.gradient(np.gradient(at, step, axis=0), step, axis=0)
+    push[:, int(np.argmax(np.abs(recording.plates[0].force).mean(axis=0)))] += mass_kg * GRAVITY_M_S2
+
+    def of(plate: Plate) -> Plate:
+        more = 0.5 * push
+        return replace(plate, force=plate.force + more, moment=plate.moment + np.cross(plate.cop, more))
+
+    return recording.with_plates(tuple(of(plate) for plate in recording.plates))
+
+
+def test_a_force_that_both_feet_share_turns_no_plate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the axis of one of them turned it cancels, and with it what the movement needs."""
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    ahead = person().prepare(squat).calibrated.ground.vectors_to_laboratory(np.array([1.0, 0.0, 0.0]))
+    shared = 30.0 * np.sin(2.0 * np.pi * 0.4 * squat.time)[:, None] * ahead
+    pushed = with_forces(squat, lambda force: force + shared)
+    person().prepare(pushed)
+    monkeypatch.setattr(plate_motion, "EXPLAINS", np.inf)
+    with pytest.raises(RecordingError, match="does not fit the motion"):
+        person().prepare(pushed)
+
+
+@pytest.mark.parametrize("mass_kg", [0.0, 1.0, 6.0, 12.0])
+def test_what_is_carried_in_the_hands_is_said(mass_kg: float) -> None:
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    who = Subject(mass_kg=70.0 + mass_kg, height_m=1.75, sex="male")
+    ready = Estimator(load_model("fullbody", who)).prepare(holding(squat, mass_kg))
+    said = [text for text in ready.messages if CARRIED in text]
+    assert len(said) == (mass_kg > 2.0)
+    if said:
+        (found,) = re.findall("as if about ([0-9]+) kg were carried in the hands", said[0])
+        assert abs(int(found) - mass_kg) < 3.0
 
 
 def faster(recording: Recording, factor: float) -> Recording:

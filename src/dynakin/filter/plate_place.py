@@ -11,7 +11,7 @@ from dynakin.bindings import _core
 from dynakin.filter.total_wrench import Ground
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.naming import listed
-from dynakin.results.records import OFF_PLACE, OFF_RATE, WARNING
+from dynakin.results.records import CARRIED, OFF_PLACE, OFF_RATE, WARNING
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +38,8 @@ def off_place(
         states: (T, n). measured: (T, 6) total wrench by the plates. names: of the plates.
     """
     loads, weight = ground.loads, initial.weighed_kg * GRAVITY_M_S2
-    if loads is None or not names or initial.contacts or any(OFF_RATE in text for text in ground.notes):
+    said = any(words in text for text in ground.notes for words in (OFF_RATE, CARRIED))
+    if loads is None or not names or initial.contacts or said:
         return ""
     limit = OFF_PLACE_M + OFF_UNSEEN_M * initial.unseen_kg / initial.weighed_kg
     inertia = [k for k, name in enumerate(initial.names) if name.startswith("inertia/")]
@@ -60,9 +61,9 @@ def off_place(
         return ""
     if whole in found:
         found = {whole: found[whole]}
-    said = [f"{name} by {np.hypot(*by):.2f} m (X {by[0]:+.2f}, Z {by[1]:+.2f})" for name, by in found.items()]
+    where = [f"{name} by {np.hypot(*by):.2f} m (X {by[0]:+.2f}, Z {by[1]:+.2f})" for name, by in found.items()]
     return (
-        f"{WARNING}{OFF_PLACE}: {listed(said)}, ground frame, "
+        f"{WARNING}{OFF_PLACE}: {listed(where)}, ground frame, "
         f"expected within {limit:.2f} m. Either the plates lie elsewhere than the file says (corners, origin, centres "
         "of pressure), or something else steadies the person."
     )

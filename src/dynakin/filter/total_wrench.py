@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.errors import RecordingError
+from dynakin.filter.carried import carried_in_hands, carried_in_words
 from dynakin.filter.closure import Closure, closure
 from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
@@ -134,7 +135,7 @@ def known_ground(
         if loads is not None:  # the recording keeps its plates, with nobody on any
             loads = replace(loads, on=np.zeros((n, len(loads.feet), len(recording.plates)), dtype=bool))
         return replace(ground, loads=loads, notes=(*check.messages, *ground.notes)), nothing
-    off_rate = list[str]()
+    by_motion = list[str]()
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
         if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
@@ -145,10 +146,12 @@ def known_ground(
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
         found = None if initial.contacts else fitting_rate(needed, total)
         if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
-            off_rate = [f"{WARNING}{wrong_rate_in_words(needed.rate, *found)}"]
+            by_motion.append(f"{WARNING}{wrong_rate_in_words(needed.rate, *found)}")
+        elif not initial.contacts and (load_kg := carried_in_hands(needed, initial, markers, total)) is not None:
+            by_motion.append(f"{WARNING}{carried_in_words(load_kg)}")
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
     judged = _judged(recording, initial, markers, wrench, loads, check, may, by_plate, tolerance)
-    notes = [*off_rate, *check.messages, *([f"Warning: {turned}."] if turned else []), *judged.notes]
+    notes = [*by_motion, *check.messages, *([f"Warning: {turned}."] if turned else []), *judged.notes]
     reasons = [*judged.reasons]
     undeclared = judged.undeclared
     if loads is not None:

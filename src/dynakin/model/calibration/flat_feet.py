@@ -20,9 +20,9 @@ _USUAL_OFF_DEG, _UNKNOWN_OFF_DEG = 5, 15
 line: by simulated walks 1 to 4 deg and 5 to 15."""
 RAISED_DEG = 12.0
 """A heel that is so much higher (or lower) over the toes than an adult's is not on the ground with them: a person on
-tiptoe is high over the floor all the time, and each marker is low by its own measure. Chosen on simulated standing (0 to
-4 deg) and tiptoe (28), and on `opencap_subject4` (3 to 6); of 20 other real recordings 0 to 8, and two beyond: a walk
-whose own standing trial says that it is 14 deg off, and a leg that is held up."""
+tiptoe is high over the floor all the time, and each marker is low by its own measure. Chosen on simulated standing (0
+to 4 deg) and tiptoe (28), and on `opencap_subject4` (3 to 6); of 20 other real recordings 0 to 8, and two beyond: a
+walk whose own standing trial says that it is 14 deg off, and a leg that is held up."""
 
 
 def flat_slopes(trial: Trial) -> dict[str, float]:

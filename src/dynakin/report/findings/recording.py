@@ -12,6 +12,7 @@ from dynakin.results.measures.soft_tissue import marker_sites
 from dynakin.results.measures.sources import out_of_sight
 from dynakin.results.naming import listed, sentence, words
 from dynakin.results.records import (
+    CARRIED,
     LOW_PASSED,
     MISPLACED,
     NEVER_FLAT,
@@ -53,6 +54,8 @@ ADVICE = {
     "legs on plates.",
     "place": "Correct where the file has the plates (corners, origin, centres of pressure), or declare what else "
     "steadies the person (--contact).",
+    "carried": "Declare what is carried ([[loads]] in a configuration, docs/models.md), and give the mass of the "
+    "person without it (--mass); or use moments of knees and ankles alone.",
     "rate": "Look at which rate the cameras recorded, and whether the files say so.",
     "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
 }
@@ -97,6 +100,7 @@ def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
         ("Standing posture", "upright", lambda text: text.startswith(NOT_UPRIGHT)),
         ("Low-passed markers", "low-passed", lambda text: text.startswith(LOW_PASSED)),
         ("Rate", "rate", lambda text: text.startswith(OFF_RATE)),
+        ("Load in the hands", "carried", lambda text: text.startswith(CARRIED)),
         ("Plates' place", "place", lambda text: text.startswith(OFF_PLACE)),
         ("Force plates", "plates", lambda text: "plate" in text),
         ("Recording", "recording", lambda text: True),
