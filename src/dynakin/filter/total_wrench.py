@@ -24,6 +24,7 @@ from dynakin.filter.plate_motion import (
     turned_axes,
     wrong_rate_in_words,
 )
+from dynakin.filter.shear import NO_SHEAR, Shear, found_shear
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
@@ -36,7 +37,7 @@ from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.force_unit import likely_unit
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
-from dynakin.results.records import IN_STEP, WARNING
+from dynakin.results.records import IN_STEP, NOT_ZEROED, WARNING
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -68,6 +69,7 @@ class Ground:
         bears: (T, C) frames in which each declared contact bears, or may, where no plate measures it.
         usable: whether the plates are used at all.
         load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
+        shear: by how much the plates' horizontal forces are off.
         notes: what there is to say. reasons: those of them that say why something is not measured.
     """
 
@@ -78,6 +80,7 @@ class Ground:
     load_ratio: float | None
     notes: tuple[str, ...]
     reasons: tuple[str, ...]
+    shear: Shear = NO_SHEAR
 
 
 def foot_markers(initial: CalibratedModel) -> dict[str, list[str]]:
@@ -135,7 +138,7 @@ def known_ground(
         if loads is not None:  # the recording keeps its plates, with nobody on any
             loads = replace(loads, on=np.zeros((n, len(loads.feet), len(recording.plates)), dtype=bool))
         return replace(ground, loads=loads, notes=(*check.messages, *ground.notes)), nothing
-    by_motion = list[str]()
+    by_motion, shear = list[str](), NO_SHEAR
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
         if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
@@ -149,8 +152,11 @@ def known_ground(
             by_motion.append(f"{WARNING}{wrong_rate_in_words(needed.rate, *found)}")
         elif not initial.contacts and (load_kg := carried_in_hands(needed, initial, markers, total)) is not None:
             by_motion.append(f"{WARNING}{carried_in_words(load_kg)}")
+        elif not initial.contacts:
+            shear = found_shear(needed, total)
+            by_motion += shear.notes
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
-    judged = _judged(recording, initial, markers, wrench, loads, check, may, by_plate, tolerance)
+    judged = _judged(recording, initial, markers, shear.zeroed(wrench), loads, check, may, by_plate, tolerance)
     notes = [*by_motion, *check.messages, *([f"Warning: {turned}."] if turned else []), *judged.notes]
     reasons = [*judged.reasons]
     undeclared = judged.undeclared
@@ -165,7 +171,8 @@ def known_ground(
     if loads is not None or used < n:
         notes.append(f"The total wrench is measured in {used} of {n} frames.")
     notes += reasons
-    return Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, tuple(notes), tuple(reasons)), wrench
+    texts = tuple(notes), tuple(reasons)
+    return Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, *texts, shear), wrench
 
 
 def _loads_of_feet(
@@ -319,6 +326,13 @@ def _undeclared_in_words(
     weight = initial.weighed_kg * GRAVITY_M_S2
     if _nearly_all(found):
         load = float(np.nanmean(wrench[judged, 1])) / GRAVITY_M_S2
+        x, up, z = (float(np.nanmean(found.excess[judged, axis])) for axis in range(3))
+        if np.hypot(x, z) > abs(up):
+            return (
+                f"{WARNING}{NOT_ZEROED} {np.hypot(x, z):.0f} N (X {-x:+.0f}, Z {-z:+.0f}, ground frame), "
+                f"{np.hypot(x, z) / weight:.1%} of the weight: they were not zeroed, or something that no plate "
+                "measures pulls the person all the time. Their sum is not used."
+            ), beyond
         named = likely_unit(load * GRAVITY_M_S2, initial.weighed_kg)
         unit = f", or the forces are in {named}, not N" if named else ""
         return (

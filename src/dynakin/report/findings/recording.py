@@ -17,9 +17,11 @@ from dynakin.results.records import (
     MISPLACED,
     NEVER_FLAT,
     NOT_UPRIGHT,
+    NOT_ZEROED,
     OFF_PLACE,
     OFF_RATE,
     REFUSED,
+    SHEAR_GAIN,
     WARNING,
     doubts_mass,
     warnings_of,
@@ -54,6 +56,9 @@ ADVICE = {
     "legs on plates.",
     "place": "Correct where the file has the plates (corners, origin, centres of pressure), or declare what else "
     "steadies the person (--contact).",
+    "zero": "Zero the plates with nobody on them before each trial; of this one take off what they read then "
+    "([[plate_loads]] in a configuration, docs/models.md).",
+    "gain": "Correct the calibration of the plates' horizontal channels (or its unit) in the file of the forces.",
     "carried": "Declare what is carried ([[loads]] in a configuration, docs/models.md), and give the mass of the "
     "person without it (--mass); or use moments of knees and ankles alone.",
     "rate": "Look at which rate the cameras recorded, and whether the files say so.",
@@ -101,6 +106,8 @@ def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
         ("Low-passed markers", "low-passed", lambda text: text.startswith(LOW_PASSED)),
         ("Rate", "rate", lambda text: text.startswith(OFF_RATE)),
         ("Load in the hands", "carried", lambda text: text.startswith(CARRIED)),
+        ("Plates' zero", "zero", lambda text: text.startswith(NOT_ZEROED)),
+        ("Plates' gain", "gain", lambda text: text.startswith(SHEAR_GAIN)),
         ("Plates' place", "place", lambda text: text.startswith(OFF_PLACE)),
         ("Force plates", "plates", lambda text: "plate" in text),
         ("Recording", "recording", lambda text: True),
