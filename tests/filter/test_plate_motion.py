@@ -14,9 +14,12 @@ import pytest
 import dynakin
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import RecordingError
+from dynakin.filter import plate_motion
 from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
+from dynakin.filter.shear import NO_SHEAR
 from dynakin.messages import about
 from dynakin.recordings.recording import Plate, Recording
+from dynakin.recordings.resampling import low_pass
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.held_out import measured_wrench
@@ -204,6 +207,85 @@ def test_plates_of_a_real_walk_off_their_place(data_dir: Path, by_m: float, told
     found = [message.text for message in about(estimator.run(shifted(walk, 0, by_m)).messages, "place")]
     assert len(found) == told
     assert not told or "(X +0.0" in found[0]
+
+
+def holding(recording: Recording, mass_kg: float) -> Recording:
+    """With the force of so much in both hands, half of it under each foot."""
+    own = [k for k, name in enumerate(recording.marker_names) if "wrist" in name]
+    at = low_pass(recording.markers[:, own].mean(axis=1), recording.rate, 6.0)
+    step = 1.0 / recording.rate
+    push = mass_kg * np.gradient(np.gradient(at, step, axis=0), step, axis=0)
+    push[:, int(np.argmax(np.abs(recording.plates[0].force).mean(axis=0)))] += mass_kg * GRAVITY_M_S2
+
+    def of(plate: Plate) -> Plate:
+        more = 0.5 * push
+        return replace(plate, force=plate.force + more, moment=plate.moment + np.cross(plate.cop, more))
+
+    return recording.with_plates(tuple(of(plate) for plate in recording.plates))
+
+
+def test_a_force_that_both_feet_share_turns_no_plate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the axis of one of them turned it cancels, and with it what the movement needs."""
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    shared = 30.0 * np.sin(2.0 * np.pi * 0.4 * squat.time)[:, None] * forward_of(squat)
+    pushed = with_forces(squat, lambda force: force + shared)
+    person().prepare(pushed)
+    monkeypatch.setattr(plate_motion, "EXPLAINS", np.inf)
+    with pytest.raises(RecordingError, match="does not fit the motion"):
+        person().prepare(pushed)
+
+
+@pytest.mark.parametrize("mass_kg", [0.0, 1.0, 6.0, 12.0])
+def test_what_is_carried_in_the_hands_is_said(mass_kg: float) -> None:
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    who = Subject(mass_kg=70.0 + mass_kg, height_m=1.75, sex="male")
+    ready = Estimator(load_model("fullbody", who)).prepare(holding(squat, mass_kg))
+    said = [message.text for message in about(ready.messages, "carried")]
+    assert len(said) == (mass_kg > 2.0)
+    if said:
+        (found,) = re.findall("as if about ([0-9]+) kg were carried in the hands", said[0])
+        assert abs(int(found) - mass_kg) < 3.0
+
+
+def forward_of(recording: Recording) -> np.ndarray:
+    """Unit vector (3,), laboratory frame."""
+    ahead: np.ndarray = person().prepare(recording).calibrated.ground.vectors_to_laboratory(np.array([1.0, 0.0, 0.0]))
+    return ahead
+
+
+@pytest.mark.parametrize("each_n", [0.0, 2.0, 12.0, 20.0])
+def test_plates_that_were_not_zeroed_in_shear_are_told_and_deviations_hold_it(each_n: float) -> None:
+    """12 N under each foot had hips 7 to 9 N m off, said to 3; with 15 the mass was called wrong and hips absent."""
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    off = each_n * forward_of(squat)
+    whole, ready = person().prepare(squat), person().prepare(with_forces(squat, lambda force: force + off))
+    said = [message.text for message in about(ready.messages, "zero")]
+    assert len(said) == (each_n > 10.0) and not whole.ground.shear.notes
+    assert not about(ready.messages, "weight")
+    assert ready.ground.loads is not None and ready.ground.loads.total_known.all()
+    sd = [np.sqrt(each.contacts.covariance[100, 0, 0]) for each in (whole, ready) if each.contacts is not None]
+    if said:
+        assert f"by {2.0 * each_n:.0f} N" in said[0] or f"by {2.0 * each_n + 1.0:.0f} N" in said[0]
+        assert sd[1] == pytest.approx(2.0 * each_n, rel=0.1)
+    else:
+        assert sd[1] == pytest.approx(sd[0], rel=0.05)
+
+
+@pytest.mark.parametrize(("gain", "told"), [(0.5, True), (0.9, False), (1.0, False), (1.5, True)])
+def test_shear_of_another_gain_is_told(gain: float, told: bool) -> None:
+    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
+    gains = np.where(np.arange(3) == up, 1.0, gain)
+    ready = person().prepare(with_forces(walk, lambda force: force * gains))
+    assert bool(about(ready.messages, "gain")) == told
+    assert (ready.ground.shear.off_gain > 0.3) == told
+
+
+def test_nothing_is_said_of_the_shear_of_real_plates(data_dir: Path) -> None:
+    folder = data_dir / "opencap_subject4"
+    for trial in ("walking1", "squats1"):
+        recording = dynakin.read(folder / f"{trial}.trc", folder / f"{trial}_grf.mot")
+        assert person().prepare(recording).ground.shear == NO_SHEAR
 
 
 def faster(recording: Recording, factor: float) -> Recording:

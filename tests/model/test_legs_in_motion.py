@@ -197,6 +197,38 @@ def test_a_foot_that_is_never_seen_flat_stands_as_an_adults_whose_heel_and_toes_
     assert any("may be 5 deg off" in message.text for message in about(found.messages, "ankles"))
 
 
+def test_a_heel_that_is_high_all_the_time_is_not_flat() -> None:
+    """On tiptoe each marker is low by its own measure: who stands so throughout, or in the standing trial, had ankles
+    that were as much off as the foot is pitched, without a word."""
+    trial = simulate("fullbody", "squat", 5, 6.0, markers="plug-in-gait")
+    estimator = dynakin.Estimator(load_model("fullbody", subject=WHO, markers="plug-in-gait"))
+    whole = estimator.calibrate(trial.recording)
+    assert not about(whole.messages, "ankles")
+    tiptoe = on_tiptoe(trial.recording, "right", 25.0)
+    for recording, static in ((tiptoe, None), (trial.recording, tiptoe)):
+        found = estimator.calibrate(recording, static=static)
+        (said,) = (message.text for message in about(found.messages, "ankles"))
+        assert "of the right foot (" in said and "deg too high" in said and "left" not in said
+    before, after = (calibrated.x0[calibrated.names.index("ankle_angle_r")] for calibrated in (whole, found))
+    assert abs(np.degrees(after - before)) < 10.0
+
+
+def on_tiptoe(recording: Recording, side: str, deg: float) -> Recording:
+    """With one foot's markers pitched about its toes by so much all the time."""
+    own = [recording.marker_names.index(side[0].upper() + end) for end in ("HEE", "TOE", "MT5")]
+    markers = recording.markers.copy()
+    heel, toe = markers[:, own[:1]], markers[:, own[1:2]]
+    up = np.array([0.0, 1.0, 0.0])
+    ahead = (toe - heel) * (1.0 - up)
+    ahead /= np.linalg.norm(ahead, axis=2, keepdims=True)
+    arm = markers[:, own] - toe
+    along, high = (arm * ahead).sum(axis=2, keepdims=True), arm[..., 1:2]
+    c, s = np.cos(np.radians(deg)), np.sin(np.radians(deg))
+    turned = (c * along + s * high) * ahead + (c * high - s * along) * up
+    markers[:, own] = toe + arm - along * ahead - high * up + turned
+    return replace(recording, markers=markers)
+
+
 def test_a_recording_of_one_side_is_told_which_marker_lacks() -> None:
     recording = simulate("fullbody", "gait", 5, 2.5, markers="opencap").recording
     own = [k for k, name in enumerate(recording.marker_names) if name[:2] in ("r_", "r.", "R_")]

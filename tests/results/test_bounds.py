@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynakin.report.findings.fit import bounds
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.bounds import bound_shares, counts_in_words, parameter_bounds
+from dynakin.results.measures.metrics import compute_metrics
 
 
 def held(estimate: Estimate, name: str, frames: np.ndarray) -> Estimate:
@@ -55,3 +57,17 @@ def test_a_parameter_without_bounds_is_never_on_one(estimate: Estimate) -> None:
     one_sided = [replace(p, lower=None) if p.name == "length/shank" else p for p in estimate.parameters]
     made = held(replace(estimate, parameters=one_sided), "length/shank", np.ones(len(estimate.time), dtype=bool))
     assert bound_shares(made, estimate.time >= 2.0)["length/shank"] == 1.0
+
+
+@pytest.mark.parametrize(("left", "tells"), [(0.3, True), (0.69, True), (0.96, False), (1.0, False)])
+def test_a_bound_tells_nothing_of_what_the_recording_did_not_teach(
+    estimate: Estimate, left: float, tells: bool
+) -> None:
+    """The lumbar length of a squat: 84 mm, to 4.2 before and after, on its bound at 101 in good ones too."""
+    lumbar = replace(
+        estimate.parameters[0], kind="length", initial=0.084, value=0.1008, lower=0.0672, upper=0.1008, at_bound=True,
+        prior_sd=0.0042, sd=float(np.hypot(0.0042 * left, 0.0072)), skin_sd=0.0072,
+    )  # fmt: skip
+    assert lumbar.bound_tells == tells
+    found = bounds(replace(estimate, parameters=[lumbar]), compute_metrics(estimate))
+    assert found is not None and (found.level == "warning") == tells

@@ -17,6 +17,7 @@ import scipy.linalg
 
 from dynakin.arrays import filled, mean_seen
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
+from dynakin.filter.shear import NO_SHEAR, Shear
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
@@ -79,7 +80,13 @@ class Prior(NamedTuple):
 
 
 def expected_loads(
-    loads: FootLoads, initial: CalibratedModel, noise: Noise, paths: Array, undeclared: Flags, bears: Flags
+    loads: FootLoads,
+    initial: CalibratedModel,
+    noise: Noise,
+    paths: Array,
+    undeclared: Flags,
+    bears: Flags,
+    shear: Shear = NO_SHEAR,
 ) -> ContactLoads:
     """The feet's wrenches, those of the declared contacts and, last, the residual: what neither they nor the model
     explain, on the root.
@@ -88,6 +95,7 @@ def expected_loads(
         paths: (T, 1 + C, 3) m, where the root is and where the C declared contacts act (`ContactPaths`).
         undeclared: (T,) frames in which something else bears the person.
         bears: (T, C) frames in which a declared contact may bear; where plates measure it, these say.
+        shear: by how much more than usual the plates' horizontal forces may be off.
     """
     weight, root, C = initial.weighed_kg * GRAVITY_M_S2, paths[:, 0], len(initial.contacts)
     feet = _CONTACT[loads.reason]
@@ -110,7 +118,7 @@ def expected_loads(
     places = np.concatenate([loads.soles.middle, paths[:, 1:]], axis=1)
     places = np.where(np.isfinite(places), places, (root * [1.0, 0.0, 1.0])[:, None])
     errors[:, each, :, each] = (
-        plate_errors(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3)).reshape(frames, K, 6, 6).swapaxes(0, 1)
+        plate_errors(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), shear).reshape(frames, K, 6, 6).swapaxes(0, 1)
     )
     for k in range(K):
         off = unmeasured[:, k]
@@ -124,7 +132,7 @@ def expected_loads(
         wrench[off, k], effects[off, :, k] = prior.mean[off], prior.spread[off]
         errors[off, k, :, k] = _about(root[off], np.array([_WHITE_N] * 3 + [_WHITE_NM] * 3))
     for t in np.flatnonzero((contact == SHARED_PLATE).any(axis=1)):
-        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors, places)
+        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors, places, shear)
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -148,14 +156,15 @@ def residual_sd(noise: Noise, initial: CalibratedModel) -> Array:
     return np.where(size.all(), np.hypot(size, more), size)
 
 
-def plate_errors(wrench: Array, contact: Array) -> Array:
+def plate_errors(wrench: Array, contact: Array, off: Shear = NO_SHEAR) -> Array:
     """Covariances (T, 6, 6) about the ground's origin of what a plate says, (T, 6) about it too: at its centre of
     pressure on the level of the contact (T, 3) m, at that itself where the plate is hardly loaded."""
     push, height = np.maximum(np.abs(wrench[:, 1]), LOADED_N), contact[:, 1]
     z, x = (wrench[:, 2] * height - wrench[:, 3]) / push, (wrench[:, 0] * height + wrench[:, 5]) / push
     loaded = (wrench[:, 1] > LOADED_N)[:, None]
     pressure = np.where(loaded, np.stack([x, height, z], axis=1), contact)
-    shear, lift = np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), np.hypot(PLATE_NOISE_N, PLATE_GAIN * push)
+    shear = np.hypot(np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), off.sd(wrench))
+    lift = np.hypot(PLATE_NOISE_N, PLATE_GAIN * push)
     moment = np.hypot(PLATE_NOISE_NM, PLATE_PLACE_M * push)
     return _about(pressure, np.stack([shear, lift, shear, moment, moment, moment], axis=1))
 
@@ -206,11 +215,17 @@ def _about(point: Array, sd: Array) -> Array:
 
 
 def _divide(
-    t: int, feet: npt.NDArray[np.intp], priors: dict[int, Prior], wrench: Array, errors: Array, places: Array
+    t: int,
+    feet: npt.NDArray[np.intp],
+    priors: dict[int, Prior],
+    wrench: Array,
+    errors: Array,
+    places: Array,
+    shear: Shear,
 ) -> None:
     """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
-    plate = plate_errors(wrench[t, feet].sum(axis=0)[None], places[t, feet[:1]])[0]
+    plate = plate_errors(wrench[t, feet].sum(axis=0)[None], places[t, feet[:1]], shear)[0]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
     root = np.linalg.cholesky(S)

@@ -39,6 +39,7 @@ class JointErrors:
         sources: (E, S) how far each of these is moved by a unit of each source of error: m a m, rad a rad.
         kinds: (S,) what each source is.
         first_moments: (3 B,) places in the state of first moments, three a segment. masses: (3 B,) kg, of the segments.
+        massive: (B,) their names.
     """
 
     model: _core.Model
@@ -48,6 +49,7 @@ class JointErrors:
     kinds: tuple[Kind, ...]
     first_moments: npt.NDArray[np.intp]
     masses: Array
+    massive: tuple[str, ...]
 
     @classmethod
     def of(
@@ -82,6 +84,7 @@ class JointErrors:
             tuple(kind for kind, _ in found),
             np.array([at[f"inertia/{segment.name}/{name}"] for segment in estimated for name in _FIRST], dtype=np.intp),
             np.repeat([float(segment.inertia[0]) for segment in estimated], len(_FIRST)),
+            tuple(segment.name for segment in estimated),
         )
 
     def state(self, q: Array, qd: Array, qdd: Array) -> Array:

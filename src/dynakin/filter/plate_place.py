@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.filter.limbs import unseen_limbs
 from dynakin.filter.total_wrench import Ground
 from dynakin.messages import Message, about, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -21,7 +22,8 @@ OFF_PLACE_M, OFF_PLACE_S = 0.03, 0.15
 real recordings of a whole body, each plate alone, 18 and less in simulated ones. Of an error the movement, which is
 bent by it, shows half to all."""
 OFF_UNSEEN_M = 0.1
-"""So much more by the part of the mass that no marker shows: at 0.38 of it 12 to 57 mm, at 0.07 up to 24."""
+"""So much more by the part of the mass that no marker shows: at 0.38 of it 12 to 57 mm, at 0.07 up to 24. Arms that
+no marker shows may be stretched out all the time."""
 BEARS = 0.3
 """Part of the weight from which the plates' load shows where it acts."""
 
@@ -38,9 +40,10 @@ def off_place(
         states: (T, n). measured: (T, 6) total wrench by the plates. names: of the plates.
     """
     loads, weight = ground.loads, initial.weighed_kg * GRAVITY_M_S2
-    if loads is None or not names or initial.contacts or about(ground.notes, "rate"):
+    if loads is None or not names or initial.contacts or about(ground.notes, "rate", "carried"):
         return None
-    limit = OFF_PLACE_M + OFF_UNSEEN_M * initial.unseen_kg / initial.weighed_kg
+    limbs = sum(sum(limb.values()) for limb in unseen_limbs(initial))
+    limit = OFF_PLACE_M + (OFF_UNSEEN_M * initial.unseen_kg + limbs) / initial.weighed_kg
     inertia = [k for k, name in enumerate(initial.names) if name.startswith("inertia/")]
     posed = states.copy()
     posed[:, inertia] = initial.x0[inertia]
@@ -64,9 +67,8 @@ def off_place(
     return warning(
         "place",
         f"by the movement the force does not act where the plates have it: {listed(said)}, ground frame, expected "
-        "within "
-        f"{limit:.2f} m. Either the plates lie elsewhere than the file says (corners, origin, centres of pressure), or "
-        "something else steadies the person.",
+        f"within {limit:.2f} m. Either the plates lie elsewhere than the file says (corners, origin, centres of "
+        "pressure), or something else steadies the person.",
     )
 
 

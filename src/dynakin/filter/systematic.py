@@ -17,6 +17,7 @@ from scipy.linalg import cho_factor, cho_solve
 from dynakin.bindings import _core
 from dynakin.filter.error_sizes import KINDS, OF_JOINTS, Sizes, less_sure_joints, usual_sizes
 from dynakin.filter.joint_errors import JointErrors, floats
+from dynakin.filter.limbs import unseen_limbs, unsure_moments
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.filter.reported_sd import BLOCKS, Parts, movement_intensity, reported
 from dynakin.messages import Message, warning
@@ -69,6 +70,7 @@ class Systematic:
         self._feet = len(calibrated.feet)
         reference = neutral(calibrated)
         self._errors = JointErrors.of(spec, reference, calibrated.held, less_sure_joints(calibrated))
+        self._limbs = unsure_moments(unseen_limbs(calibrated), self._errors.massive)
         self._reference = reference[self._free]
         first = {name: k for k, name in enumerate(calibrated.names)}
         axes = [[f"marker/{marker.name}/{axis}" for axis in "xyz"] for marker in spec.markers]
@@ -149,7 +151,10 @@ class Systematic:
         found["skin"] = self._labelled(*self._skin(q, qd, qdd, (G, Gd, Gdd), (Tq, Tv, Ta)))
         still = np.zeros_like(q)
         displaced = T[:, errors.first_moments] * errors.masses
-        found["mass_centre"] = self._labelled(still, still, still, np.square(displaced).sum(axis=1))
+        centres = np.square(displaced).sum(axis=1)
+        if self.sizes.mass_centre:  # what limbs do is known in kg m, whatever the size of that
+            centres += np.square(T[:, errors.first_moments] @ self._limbs / self.sizes.mass_centre).sum(axis=1)
+        found["mass_centre"] = self._labelled(still, still, still, centres)
         return found
 
     def _rolled(self, q: Array) -> Array:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.errors import RecordingError
+from dynakin.filter.carried import carried_in_hands, carried_in_words
 from dynakin.filter.closure import Closure, closure
 from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
@@ -25,6 +26,7 @@ from dynakin.filter.plate_motion import (
     turned_axes,
     wrong_rate_in_words,
 )
+from dynakin.filter.shear import NO_SHEAR, Shear, found_shear, not_zeroed
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
@@ -69,6 +71,7 @@ class Ground:
         bears: (T, C) frames in which each declared contact bears, or may, where no plate measures it.
         usable: whether the plates are used at all.
         load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
+        shear: by how much the plates' horizontal forces are off.
         notes: what there is to say. reasons: those of them that say why something is not measured.
         behind_s: by how much the plates lagged behind the markers and were brought into step.
     """
@@ -80,6 +83,7 @@ class Ground:
     load_ratio: float | None
     notes: tuple[Message, ...]
     reasons: tuple[Message, ...]
+    shear: Shear = NO_SHEAR
     behind_s: float = 0.0
 
 
@@ -155,7 +159,7 @@ def _known_ground(
         if loads is not None:  # the recording keeps its plates, with nobody on any
             loads = replace(loads, on=np.zeros((n, len(loads.feet), len(recording.plates)), dtype=bool))
         return replace(ground, loads=loads, notes=(*check.messages, *ground.notes)), nothing
-    off_rate = list[Message]()
+    by_motion, shear = list[Message](), NO_SHEAR
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
         if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
@@ -166,10 +170,15 @@ def _known_ground(
             return _brought_into_step(recording, initial, markers, Delay(delay, COARSE_S), assigned, tolerance)
         found = None if initial.contacts else fitting_rate(needed, total)
         if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
-            off_rate = [warning("rate", wrong_rate_in_words(needed.rate, *found))]
+            by_motion.append(warning("rate", wrong_rate_in_words(needed.rate, *found)))
+        elif not initial.contacts and (load_kg := carried_in_hands(needed, initial, markers, total)) is not None:
+            by_motion.append(warning("carried", carried_in_words(load_kg)))
+        elif not initial.contacts:
+            shear = found_shear(needed, total)
+            by_motion += shear.notes
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
-    judged = _judged(recording, initial, markers, wrench, loads, check, may, by_plate, tolerance)
-    notes = [*off_rate, *check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
+    judged = _judged(recording, initial, markers, shear.zeroed(wrench), loads, check, may, by_plate, tolerance)
+    notes = [*by_motion, *check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
     reasons = [*judged.reasons]
     undeclared = judged.undeclared
     if loads is not None:
@@ -183,7 +192,8 @@ def _known_ground(
     if loads is not None or used < n:
         notes.append(note("plates", f"The total wrench is measured in {used} of {n} frames."))
     notes += reasons
-    return Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, tuple(notes), tuple(reasons)), wrench
+    texts = tuple(notes), tuple(reasons)
+    return Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, *texts, shear), wrench
 
 
 def _loads_of_feet(
@@ -351,6 +361,13 @@ def _undeclared_in_words(
     weight = initial.weighed_kg * GRAVITY_M_S2
     if _nearly_all(found):
         load = float(np.nanmean(wrench[judged, 1])) / GRAVITY_M_S2
+        x, up, z = (float(np.nanmean(found.excess[judged, axis])) for axis in range(3))
+        if np.hypot(x, z) > abs(up):
+            text = (
+                f"{not_zeroed(-x, -z, weight)}: they were not zeroed, or something that no plate measures pulls the "
+                "person all the time. Their sum is not used."
+            )
+            return warning("zero", text), beyond
         named = likely_unit(load * GRAVITY_M_S2, initial.weighed_kg)
         unit = f", or the forces are in {named}, not N" if named else ""
         return (
@@ -358,9 +375,8 @@ def _undeclared_in_words(
                 "weight",
                 f"the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
                 f"(by the motion {load + float(np.nanmean(found.excess[judged, 1])) / GRAVITY_M_S2:.1f} kg): the mass "
-                "is "
-                "wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, a "
-                f"weight, a cable, a rail){unit}. The plates are not used for the total.",
+                "is wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, "
+                f"a weight, a cable, a rail){unit}. The plates are not used for the total.",
             )
         ), beyond
     spans, sizes, away = list[str](), list[tuple[float, int]](), list[float]()

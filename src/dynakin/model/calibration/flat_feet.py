@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -18,6 +18,11 @@ from dynakin.results.naming import listed
 _USUAL_OFF_DEG, _UNKNOWN_OFF_DEG = 5, 15
 """Of the zero of an ankle's angle where heel and toes count as an adult's on a flat foot, and where there is no such
 line: by simulated walks 1 to 4 deg and 5 to 15."""
+RAISED_DEG = 12.0
+"""A heel that is so much higher (or lower) over the toes than an adult's is not on the ground with them: a person on
+tiptoe is high over the floor all the time, and each marker is low by its own measure. Chosen on simulated standing (0
+to 4 deg) and tiptoe (28), and on `opencap_subject4` (3 to 6); of 20 other real recordings 0 to 8, and two beyond: a
+walk whose own standing trial says that it is 14 deg off, and a leg that is held up."""
 
 
 def flat_slopes(trial: Trial) -> dict[str, float]:
@@ -48,14 +53,28 @@ def usual_slopes(finder: LandmarkFinder) -> dict[str, float]:
     return found
 
 
+def raised_heels(flat: Mapping[str, float], usual: Mapping[str, float]) -> dict[str, float]:
+    """Side -> how much higher (deg) than usual a heel is whose foot does not lie flat where `flat_slopes` has it."""
+    above = {side: float(np.degrees(usual[side] - slope)) for side, slope in flat.items() if side in usual}
+    return {side: deg for side, deg in above.items() if abs(deg) > RAISED_DEG}
+
+
 def never_flat(
-    model: ModelFile, flat: Collection[str], usual: Collection[str], chosen: Sequence[Candidate]
+    model: ModelFile,
+    flat: Collection[str],
+    usual: Collection[str],
+    raised: Mapping[str, float],
+    chosen: Sequence[Candidate],
 ) -> list[Message]:
-    """Sentences on marked feet of a person who does not stand still, but for those of ``flat`` sides, whose heel and
-    toes show how they stand: the line between these is the usual one's, or there is none and the foot counts as flat in
-    a frame in which it may not be."""
+    """Sentences on marked feet, but for those of ``flat`` sides, of which it is known how they stand: the line from
+    heel to toe is the usual one's, or there is none and the foot counts as flat in a frame in which it may not be."""
     marked = {candidate.segment for candidate in chosen}
     own = [s.side for s in model.segments if s.side is not None and "foot" in s.parts and s.name in marked]
+    how = "heel and toes together on the ground, or standing still"
+    if raised:
+        off = {side: f"{abs(deg):.0f} deg too {'high' if deg > 0.0 else 'low'}" for side, deg in raised.items()}
+        heels = [f"the {side} heel is {by}" for side, by in off.items()]
+        how = f"{listed(heels)} over the toes, as on tiptoe, in equinus or in shoes with heels"
     found = []
     for off_deg, feet in (
         (_USUAL_OFF_DEG, [f"the {side} foot" for side in own if side in usual and side not in flat]),
@@ -65,9 +84,8 @@ def never_flat(
             found.append(
                 warning(
                     "ankles",
-                    f"nothing shows the sole flat of {listed(feet)} (heel and toes together on the ground, or "
-                    "standing still): the "
-                    f"zero of the ankle's angle may be {off_deg} deg off. Give a standing trial (--static).",
+                    f"nothing shows the sole flat of {listed(feet)} ({how}): the zero of the ankle's angle may be "
+                    f"{off_deg} deg off. Give a standing trial with flat feet (--static).",
                 )
             )
     return found

@@ -21,7 +21,7 @@ from dynakin.model.calibration.checks import (
     report,
 )
 from dynakin.model.calibration.completion import Completed, completed
-from dynakin.model.calibration.flat_feet import flat_slopes, never_flat, usual_slopes
+from dynakin.model.calibration.flat_feet import flat_slopes, never_flat, raised_heels, usual_slopes
 from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmark_markers import in_both, needed_markers, seen_together, table_markers
@@ -225,7 +225,6 @@ def _marked(asked: Asked, trials: _Trials, messages: list[Message]) -> _Marked:
         finder.height_m = height[0]
         finder.widths_m, said = _joint_widths(asked.recordings, finder)
         messages += said
-        finder.sole = flat_slopes(source)
     return _Marked(model, finder, chosen, locks, bare, height, needed_markers(model, finder, locks))
 
 
@@ -255,10 +254,7 @@ def _landmarks(
     found = Completed(finder.find(standing))
     if not model.sided:
         return found, ()
-    if not still.stands:
-        flat, usual = finder.sole, usual_slopes(finder)
-        finder.sole = usual | dict(flat)
-        messages += never_flat(model, flat, usual, marked.chosen)
+    messages += _soles(model, finder, still, marked.chosen)
     landmarks = finder.find_in_space(standing)
     if asked.functional:
         landmarks, how_found = functional_landmarks(asked.functional, landmarks, finder, source, still.frames)
@@ -292,6 +288,16 @@ def _landmarks(
             )
         )
     return found, unmarked
+
+
+def _soles(model: ModelFile, finder: LandmarkFinder, still: _Still, chosen: Sequence[Candidate]) -> list[Message]:
+    """How heel and toes lie on a flat foot, kept in the finder; sentences on feet of which nothing shows it."""
+    flat, usual = flat_slopes(still.source), usual_slopes(finder)
+    raised = raised_heels(flat, usual)
+    flat = {side: slope for side, slope in flat.items() if side not in raised}
+    finder.sole = {side: slope for side, slope in usual.items() if side in raised or not still.stands} | flat
+    known = SIDES if still.stands else tuple(flat)  # who stands still stands flat
+    return never_flat(model, [side for side in known if side not in raised], usual, raised, chosen)
 
 
 def _mass_and_height(

@@ -41,7 +41,7 @@ _KINDS = (
     _Kind(
         "Ankle angles",
         ("ankles",),
-        "Give a standing trial (--static), or take these ankles' angles by their changes alone.",
+        "Give a standing trial with flat feet (--static), or take these ankles' angles by their changes alone.",
     ),
     _Kind(
         "Standing posture",
@@ -55,6 +55,23 @@ _KINDS = (
         "plates.",
     ),
     _Kind("Rate", ("rate",), "Look at which rate the cameras recorded, and whether the files say so."),
+    _Kind(
+        "Load in the hands",
+        ("carried",),
+        "Declare what is carried ([[loads]] in a configuration, docs/models.md), and give the mass of the person "
+        "without it (--mass); or use moments of knees and ankles alone.",
+    ),
+    _Kind(
+        "Plates' zero",
+        ("zero",),
+        "Zero the plates with nobody on them before each trial; of this one take off what they read then "
+        "([[plate_loads]] in a configuration, docs/models.md).",
+    ),
+    _Kind(
+        "Plates' gain",
+        ("gain",),
+        "Correct the calibration of the plates' horizontal channels (or its unit) in the file of the forces.",
+    ),
     _Kind(
         "Plates' place",
         ("place",),

@@ -1,0 +1,62 @@
+"""Limbs that no marker shows: they are locked to what carries them, and may hang, swing or be raised."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.bindings import _core
+from dynakin.model.calibration.calibrated import CalibratedModel
+
+Array = npt.NDArray[np.float64]
+
+RAISED = 0.6
+"""Part of the distance from a limb's joint by which its centres of mass may lie forwards or higher than where it hangs:
+0.1 to 0.3 walking, 0.7 in `truth3d`'s squats, 1 stretched out."""
+APART = 0.3
+"""The same sidewards, of each limb by itself."""
+_AXES = 3
+
+
+def unseen_limbs(calibrated: CalibratedModel) -> list[dict[str, float]]:
+    """Of each: its segments, and the first moment (kg m) of each about the limb's joint.
+
+    A limb has two segments or more, and hangs on a segment that is marked and is not the root: head and hands count as
+    still, of what hangs on the root the joint's moment is absent.
+    """
+    spec = calibrated.spec
+    parents = {segment.name: segment.parent for segment in spec.segments}
+    marked = {marker.segment for marker in spec.markers}
+    members: dict[str, list[str]] = {}
+    for segment in spec.segments:  # children stand after their parents
+        if segment.name in marked:
+            continue
+        top = next((first for first, own in members.items() if segment.parent in own), segment.name)
+        members.setdefault(top, []).append(segment.name)
+    limbs = [own for top, own in members.items() if len(own) > 1 and parents.get(parents[top], "ground") != "ground"]
+    if not limbs:
+        return []
+    model = _core.Model(spec)
+    turns, places = _core.segment_poses(model, np.array(calibrated.x0))
+    at = {name: k for k, name in enumerate(model.segment_names)}
+    inertia = {segment.name: np.array(segment.inertia[: 1 + _AXES]) for segment in spec.segments}
+
+    def moment(name: str, joint: Array) -> float:
+        mass, first = inertia[name][0], inertia[name][1:]
+        return float(np.linalg.norm(mass * (places[at[name]] - joint) + turns[at[name]] @ first))
+
+    return [{name: moment(name, places[at[own[0]]]) for name in own if inertia[name][0] > 0.0} for own in limbs]
+
+
+def unsure_moments(limbs: Sequence[dict[str, float]], segments: Sequence[str]) -> Array:
+    """(3 B, S) standard deviations, kg m, of the first moments of segments along their axes: all limbs forwards, all of
+    them up, each to its side."""
+    sources = np.zeros((len(segments), _AXES, 2 + len(limbs)))
+    for k, limb in enumerate(limbs):
+        for name, moment in limb.items():
+            own = sources[segments.index(name)]
+            own[0, 0] = own[1, 1] = RAISED * moment
+            own[2, 2 + k] = APART * moment
+    return sources.reshape(_AXES * len(segments), -1)

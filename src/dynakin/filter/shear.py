@@ -1,0 +1,110 @@
+"""Plates whose horizontal forces are wrong all the time: not zeroed, or of another gain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter.closure import smoothed
+from dynakin.filter.plate_motion import Needed
+from dynakin.messages import Message, warning
+
+Array = npt.NDArray[np.float64]
+
+ZERO, ZERO_S = 0.015, 2.0
+"""Part of the weight that the mean horizontal force may be off what the motion needs, over so long at least: on average
+nobody accelerates, and a shorter time leaves speeds of the centre of mass that markers know to some cm/s. Chosen on
+walks and squats of `truth3d` (seeds 1 to 4) and on `opencap_subject4`: 0 to 0.005; of 12 others, real and simulated,
+0 to 0.005 as well, 0.014 and 0.03 of somebody who stands in `MH0222`, 0.03 and 0.05 of functional trials on one leg."""
+STEADY = 0.5
+"""Part of it that each third of the recording has at least: a hand on a rail comes and goes."""
+GAIN, GAIN_S = (0.65, 1.35), 1.0
+"""Horizontal force over what the motion needs, over so long at least: walks of `truth3d` 0.74 to 0.86 (their pelvis'
+skin is in the motion), which chose, real ones 0.86 to 1.11, other simulated ones 0.97 to 1.08."""
+VIGOROUS, FOLLOWS = 0.03, 0.95
+"""What it takes to tell it: what the motion needs varies by this part of the weight (standard deviation; squats have
+0.016), and the force follows it (correlation)."""
+
+
+@dataclass(frozen=True)
+class Shear:
+    """By how much the plates' horizontal forces are off: zero, N, X and Z of the ground, of their sum; off_gain, part
+    of any. notes: what there is to say."""
+
+    zero: tuple[float, float] = (0.0, 0.0)
+    off_gain: float = 0.0
+    notes: tuple[Message, ...] = ()
+
+    def sd(self, wrench: Array) -> Array:
+        """(T,) N, of each horizontal component of a plate's wrench (T, 6), because any may have all of the zero; 0
+        where nothing bears on it."""
+        sd = np.hypot(np.hypot(*self.zero), self.off_gain * np.hypot(wrench[:, 0], wrench[:, 2]))
+        return np.where(wrench[:, 1] > 0.0, sd, 0.0)
+
+    def zeroed(self, wrench: Array) -> Array:
+        """The sum over the plates (T, 6) without its zero."""
+        return np.asarray(wrench - np.array([self.zero[0], 0.0, self.zero[1], 0.0, 0.0, 0.0]))
+
+
+NO_SHEAR = Shear()
+"""Nothing is off."""
+
+
+def found_shear(needed: Needed, force: Array) -> Shear:
+    """What the motion of the centre of mass says of the plates' sum (T, 3) N, NaN where it is not known."""
+    zero, gain = _zero(needed, force), _gain(needed, force)
+    notes = []
+    if zero is not None:
+        text = (
+            f"{not_zeroed(zero[0], zero[1], needed.weight)}, expected within {ZERO:.1%}: they were not zeroed, or a "
+            "hand holds on to something. Deviations of moments hold as much at each foot."
+        )
+        notes.append(warning("zero", text))
+    if gain is not None:
+        text = (
+            f"the plates' horizontal force is {gain:.2f} times what the motion needs, expected {GAIN[0]:g} to "
+            f"{GAIN[1]:g}. Deviations of moments hold the difference."
+        )
+        notes.append(warning("gain", text))
+    off = (0.0, 0.0) if zero is None else (float(zero[0]), float(zero[1]))
+    return Shear(off, 0.0 if gain is None else abs(1.0 - 1.0 / gain), tuple(notes))
+
+
+def not_zeroed(x: float, z: float, weight: float) -> str:
+    """By how much the plates push sideways all the time, N, ground frame."""
+    return (
+        f"on average the plates push sideways by {np.hypot(x, z):.0f} N (X {x:+.0f}, Z {z:+.0f}, ground frame), "
+        f"{np.hypot(x, z) / weight:.1%} of the weight"
+    )
+
+
+def _zero(needed: Needed, force: Array) -> Array | None:
+    """(2,) N, X and Z of what is too much all the time."""
+    if not needed.judged_s(force) >= ZERO_S:  # a rate that is NaN, too
+        return None
+    excess = (force - needed.force)[needed.judged(force)][:, [0, 2]]
+    mean = excess.mean(axis=0)
+    size = float(np.hypot(*mean))
+    if size < ZERO * needed.weight:
+        return None
+    thirds = [float(part.mean(axis=0) @ mean) / size for part in np.array_split(excess, 3)]
+    return mean if min(thirds) > STEADY * size else None
+
+
+def _gain(needed: Needed, force: Array) -> float | None:
+    """Of the axis of the ground whose force is farther off what the motion needs."""
+    if not (needed.whole and needed.judged_s(force) >= GAIN_S):
+        return None
+    judged, found = needed.judged(force), []
+    both = smoothed(np.where(judged[:, None], np.hstack([needed.force, force]), 0.0), judged, needed.rate)[judged]
+    for axis in (0, 2):
+        moved, carried = both[:, axis], both[:, 3 + axis]
+        if moved.std() < VIGOROUS * needed.weight or not carried.any():
+            continue
+        follows = float(np.corrcoef(moved, carried)[0, 1])
+        least = float(np.polyfit(moved, carried, 1)[0])
+        if follows > FOLLOWS and (least > GAIN[1] or least / follows**2 < GAIN[0]):
+            found.append(least / follows)
+    return max(found, key=lambda gain: abs(np.log(gain)), default=None)
