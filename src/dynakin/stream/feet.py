@@ -15,7 +15,6 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.declared import may_bear
 from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.assignment import BETWEEN_M
 from dynakin.recordings.feet.belt import WINDOW_S, one_velocity
 from dynakin.recordings.feet.contact import (
     AFTER_S,
@@ -28,6 +27,7 @@ from dynakin.recordings.feet.contact import (
 )
 from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
+from dynakin.recordings.feet.sharing import BETWEEN_M
 from dynakin.recordings.feet.soles import FootShape, Soles
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate, level_pressure
