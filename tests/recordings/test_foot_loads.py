@@ -16,7 +16,7 @@ from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, REASONS, SHARED, 
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.ground_plate import saturated
 from dynakin.recordings.recording import Plate, Recording
-from support.made_steps import FOOT_MARKERS, LABORATORY, MadePlate, lasting, steps, walk
+from support.made_steps import FOOT_MARKERS, LABORATORY, Made, MadePlate, Stance, lasting, steps, walk
 
 T = 400
 TIME = np.arange(T) / 100.0
@@ -172,3 +172,85 @@ def test_real_plates(data_dir: Path) -> None:
     assert np.abs(loads.wrench.sum(axis=1) - total)[known].max() < 10.0  # an empty plate's noise is nobody's
     turned = replace(gait, plates=tuple(replace(p, corners=None) for p in gait.plates))
     assert foot_loads(turned, ground, foot_markers_of(turned)).total_known[(gait.time > 0.45) & (gait.time < 1.8)].all()
+
+
+def with_part_moved(made: Made, source: str, target: str, part: np.ndarray) -> Recording:
+    """That part (T,) of what one plate carries, on another one."""
+    moved = next(plate for plate in made.recording.plates if plate.name == source)
+    plates = []
+    for plate in made.recording.plates:
+        share = part[:, None] * ((plate.name == target) - float(plate.name == source))
+        force, moment = plate.force + share * moved.force, plate.moment + share * moved.moment
+        plates.append(replace(plate, force=force, moment=moment))
+    return made.recording.with_plates(tuple(plates))
+
+
+def assert_measured_is_true(recording: Recording, push: np.ndarray) -> np.ndarray:
+    """(T, F) where a foot's wrench is called measured: there it is the foot's; no foot is off the plates."""
+    loads = foot_loads(recording, LABORATORY, FOOT_MARKERS)
+    measured = loads.reason <= MEASURED
+    np.testing.assert_allclose(loads.wrench[..., 1][measured], push[measured], atol=25.0)
+    assert not (loads.reason == OFF_PLATE).any() and loads.total_known.all()
+    return measured
+
+
+@pytest.mark.parametrize("edges", [True, False])
+@pytest.mark.parametrize("apart_m", [0.14, 0.2, 0.3])
+def test_who_lifts_a_foot_from_one_plate_shares_it_while_both_stand(apart_m: float, edges: bool) -> None:
+    """As briefly as that may be in a press of which most is the other foot's alone."""
+    feet = {
+        "right": [Stance(0.0, 6.0, 0.0, 0.5 * apart_m, 0.0, ("one",))],
+        "left": [Stance(*span, 0.0, -0.5 * apart_m, 0.0, ("one",)) for span in ((0.0, 0.7), (5.0, 6.0))],
+    }
+    made = steps(6.0, feet, [MadePlate("one", edges=edges)])
+    measured = assert_measured_is_true(made.recording, made.push)
+    assert measured[200:400].all() and not measured[:70].any() and not measured[520:].any()
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "share", "first_s", "last_s"),
+    [
+        ("p2", "p1", 1.0, 1.10, 1.18),  # the heel sets down before the edge
+        ("p1", "p2", 1.0, 1.19, 1.25),  # the toes leave from beyond it
+        ("p1", "p2", 0.3, 1.10, 1.25),
+        ("p2", "p1", 0.3, 1.10, 1.25),
+    ],
+)
+def test_a_foot_partly_on_its_neighbours_plate_shares_it(
+    source: str, target: str, share: float, first_s: float, last_s: float
+) -> None:
+    """In double support; all other frames stay measured."""
+    made = steps(lasting(4), walk(4, 0.6), [MadePlate(f"p{k}", edges=False) for k in range(4)])
+    time = made.recording.time
+    recording = with_part_moved(made, source, target, share * ((time > first_s) & (time < last_s)))
+    measured = assert_measured_is_true(recording, made.push)
+    assert not measured[(time > first_s + 0.01) & (time < last_s - 0.01)].any()
+    assert measured[(time < 1.02) | (time > 1.33)].all()
+
+
+@pytest.mark.parametrize(("first", "end"), [(0, 235), (58, 235), (0, 121), (116, 178)])
+def test_a_long_plate_is_shared_in_double_support_wherever_a_recording_begins_and_ends(first: int, end: int) -> None:
+    feet = {side: [replace(s, plates=("long",)) for s in own] for side, own in walk(4, 0.6).items()}
+    made = steps(lasting(4), feet, [MadePlate("long", edges=False)])
+    plate, whole = made.recording.plates[0], made.recording
+    kept = {name: getattr(plate, name)[first:end] for name in ("force", "moment", "cop", "free_moment")}
+    cut = replace(whole, time=whole.time[first:end], markers=whole.markers[first:end], plates=(replace(plate, **kept),))
+    measured = assert_measured_is_true(cut, made.push[first:end])
+    assert not measured[(made.push[first:end] > 70.0).all(axis=1)].any()
+    assert measured.all(axis=1)[(made.push[first:end] > 10.0).sum(axis=1) < 2].mean() > 0.5
+
+
+def test_a_foot_whose_sole_its_markers_do_not_show_keeps_its_plate() -> None:
+    """Its heel lies 0.16 m behind the only marker."""
+    made = steps(lasting(4), walk(4, 0.6), [MadePlate(f"p{k}", edges=False) for k in range(4)])
+    assert foot_loads(made.recording, LABORATORY, {"right": ["RMT5"], "left": ["LMT5"]}).all_measured.all()
+
+
+def test_a_plate_beside_one_of_two_flat_feet_is_shared_and_its_place_doubted() -> None:
+    """Between them, and nearer than any sole of the foot that is not on a plate of its own."""
+    push = np.full(T, 350.0)
+    recording = walker({}, (plate("a", push, at(0.0, -0.15)), plate("b", push, at(0.0, 0.07))))
+    wide = replace(recording, markers=recording.markers * [1.0, 1.0, 1.5])
+    loads = foot_loads(wide, LABORATORY, MARKERS)
+    assert (loads.reason == SHARED).all()
+    assert any("b lies off its place" in text for text in loads.messages)

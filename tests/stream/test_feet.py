@@ -235,6 +235,19 @@ def test_two_feet_on_one_plate_share_it_by_their_priors_and_it_is_said_once(tria
     assert person.feet.news() == []
 
 
+def test_a_plate_that_presses_between_two_feet_for_once_is_shared_for_as_long_as_both_stand(
+    trial: SimulatedTrial,
+) -> None:
+    person = Standing(trial)
+    right, left = person.middles
+    for _ in range(30):
+        found, known = person.look(700.0, right)
+    assert not known and found.contact.tolist() == [[ON_PLATE, UNMEASURED, ON_PLATE]]
+    for point in [0.5 * (right + left)] * 3 + [right] * 10:
+        found, known = person.look(700.0, point)
+    assert known and found.contact.tolist() == [[SHARED_PLATE, SHARED_PLATE, ON_PLATE]]
+
+
 def test_a_foot_beside_the_plate_is_not_measured(trial: SimulatedTrial) -> None:
     person = Standing(trial)
     found, known = person.look(350.0, person.middles[0])

@@ -15,7 +15,6 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.declared import may_bear
 from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.assignment import BETWEEN_M
 from dynakin.recordings.feet.belt import WINDOW_S, one_velocity
 from dynakin.recordings.feet.contact import (
     AFTER_S,
@@ -28,6 +27,7 @@ from dynakin.recordings.feet.contact import (
 )
 from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
+from dynakin.recordings.feet.sharing import BETWEEN_M, SHORTEST_S, beside_m
 from dynakin.recordings.feet.soles import FootShape, Soles
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate, level_pressure
@@ -92,6 +92,8 @@ class LiveFeet:
         self._touched = np.full(F, -np.inf)  # when the foot last stood
         self._near, self._loaded = np.zeros((F, P), dtype=int), np.zeros((F, P), dtype=int)  # frames of this stance
         self._between, self._press = np.zeros(P, dtype=int), np.zeros(P, dtype=int)  # frames of this press
+        self._beside = np.full(P, np.inf)  # since when it presses between two soles
+        self._shared = np.zeros((F, P), dtype=bool)  # it has, since this foot stands and this plate is pressed
         self._owners = np.zeros((F, P), dtype=bool)  # of the plates that are pressed
         self._range = _Range(P)
         self._closure: LiveClosure | None = None
@@ -189,20 +191,17 @@ class LiveFeet:
         """Soles of this moment (T = 1). Their sizes and places among the markers are those that were seen first. When
         a stance that goes on will end is not known yet."""
         F = len(self.feet)
-        if not self._shapes:
-            for f, own in enumerate(self._own):
-                points = outlines[[f]][:, own < len(self._floor)]
-                self._shapes.append(FootShape.of(points, self._forward))
+        shapes = self._soles_among(outlines)
         self._since = np.where(bears, np.fmin(self._since, time_s), np.nan)
         lowest = float(np.append(self._standing, np.inf)[self._own].min(initial=np.inf))
-        middle, half = np.full((1, F, 3), np.nan), np.stack([shape.half_m for shape in self._shapes])
+        middle, half = np.full((1, F, 3), np.nan), np.stack([shape.half_m for shape in shapes])
         pressure, covariance = middle.copy(), np.tile(np.eye(2), (1, F, 1, 1))
         for f in np.flatnonzero(self._marked).tolist():
-            own = self._own[f] < len(self._floor)
+            own = self._seen(f)
             points = outlines[[f]][:, own]
-            x, z = self._shapes[f].middle(points)[0]
+            x, z = shapes[f].middle(points)[0]
             rise = places[self._own[f][own], 1] - self._floor[self._own[f][own]]
-            ahead, covariance[:, f] = self._shapes[f].rolled(points, rise[None])
+            ahead, covariance[:, f] = shapes[f].rolled(points, rise[None])
             over = float(self._floor[self._own[f][own]].min()) - lowest  # steps down are below where the feet began
             middle[0, f] = x, self._floor_m + over + self._level[f], z
             pressure[0, f] = middle[0, f] + np.array([ahead[0, 0], 0.0, ahead[0, 1]])
@@ -217,6 +216,17 @@ class LiveFeet:
             soles = replace(soles, rate=rate, share_before=share)
         self._share = time_s, soles.share
         return soles
+
+    def _seen(self, f: int) -> Flags:
+        """(K,) which rows of a foot's outline are its markers."""
+        return np.asarray(self._own[f] < len(self._floor))
+
+    def _soles_among(self, outlines: Array) -> list[FootShape]:
+        """Each foot's sole among its markers, as these were seen first."""
+        if not self._shapes:
+            seen = [outlines[[f]][:, self._seen(f)] for f in range(len(self.feet))]
+            self._shapes = [FootShape.of(points, self._forward) for points in seen]
+        return self._shapes
 
     def news(self) -> list[str]:
         """Sentences, each said once."""
@@ -296,9 +306,11 @@ class LiveFeet:
             between = apart & (distance_to_hull(cops, both) < BETWEEN_M)
             self._between += between
             near |= between & (2 * self._between > self._press)
+        self._shared[:, self._press_between(plates, cops, outlines, bears, away.min(axis=0))] = True
+        self._shared &= bears[:, None] & np.array([plate.pressed[0] for plate in plates])
         for p, foot in self._assigned.items():
             near[:, p] = np.arange(F) == foot
-        near[:, list(self._given)] = False
+        near[:, list(self._given)] = self._shared[:, list(self._given)] = False
         self._loaded += touches[:, None] & loaded
         self._near += touches[:, None] & loaded & near
         mine = self._majority() & bears[:, None]
@@ -309,11 +321,32 @@ class LiveFeet:
                 self._between[p] = self._press[p] = 0
             elif p in self._assigned:
                 self._owners[:, p] = near[:, p]
-            elif mine[:, p].any():
-                self._owners[:, p] = mine[:, p]
+            elif (mine | self._shared)[:, p].any():
+                self._owners[:, p] = (mine | self._shared)[:, p]
             elif not self._owners[:, p].any():  # a foot that sets down, before it stands
                 nearest = int(np.argmin(away[:, p]))
                 self._owners[nearest, p] = bool(near[nearest, p] and low[nearest])
+
+    def _press_between(
+        self, plates: list[GroundPlate], cops: Array, outlines: Array, bears: Flags, away: Array
+    ) -> Flags:
+        """(P,) plates that have pressed between two feet that may bear, under neither sole, for `SHORTEST_S`.
+
+        Args:
+            away: (P,) m from the markers of the nearest foot, whose sole is no further away.
+        """
+        beside = beside_m(np.concatenate([plate.push for plate in plates]))
+        found = np.isfinite(away) & (away > beside)
+        if len(bears) != 2 or not bears.all() or not self._marked.all():
+            found[:] = False
+        elif found.any():
+            shapes = self._soles_among(outlines)
+            soles = [shapes[f].reach(outlines[[f]][:, self._seen(f)]) for f in range(2)]
+            corners = [np.repeat(sole, len(plates), axis=0) for sole in (*soles, np.concatenate(soles, axis=1))]
+            right, left, both = (distance_to_hull(cops, sole) for sole in corners)
+            found &= (np.fmin(right, left) > beside) & (both < beside)
+        self._beside = np.where(found, np.fmin(self._beside, self._time), np.inf)
+        return np.asarray(self._time - self._beside >= SHORTEST_S)
 
 
 class _Belts:

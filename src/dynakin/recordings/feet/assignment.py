@@ -1,9 +1,11 @@
 """Which foot stands on which plate: the one assignment that a run has.
 
 A plate belongs to a stance (`foot_contacts`) when its centre of pressure lies within or near the foot's outline for
-most of its load, and the foot stands on its level. A stance that no plate belongs to is off the plates: as long as it
-may bear load, the total external wrench is not known. A foot that nobody sees for a while keeps its plate for as long
-as that is pressed; what it does afterwards is not known.
+most of its load, and the foot stands on its level. Wherever it lies under neither sole but between two, both feet stand
+on it, from the first to the last frame that these stances and the press have in common: a foot that stands does not
+move. A stance that no plate belongs to is off the plates: as long as it may bear load, the total external wrench is not
+known. A foot that nobody sees for a while keeps its plate for as long as that is pressed; what it does afterwards is
+not known.
 """
 
 from __future__ import annotations
@@ -21,9 +23,9 @@ from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
 from dynakin.recordings.feet.findings import exchanged, plate_findings
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
 from dynakin.recordings.feet.loads import FootLoads, divided
+from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, partly_on
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.frame import GroundFrame
-from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.plates.surfaces import SAME_LEVEL_M
@@ -31,11 +33,6 @@ from dynakin.recordings.recording import Array, Recording
 
 Flags = npt.NDArray[np.bool_]
 
-BETWEEN_M = 0.03
-"""How far from both feet a centre of pressure lies that neither bears alone, for most of a press: at toe-off it may lie
-as far before a foot whose plate, or whose markers, are a little off their place, in a tenth to a fourth of it."""
-BEYOND_M = 0.04
-"""How far a touching marker may lie beyond the plates' edges: it sits on the shoe, not on its sole."""
 STEP_S = 0.25
 """How long a foot may press a plate before its markers show that it stands, and after they show that it left."""
 MOST = 0.8
@@ -66,7 +63,7 @@ def foot_loads(
     plates = [GroundPlate.of(plate, ground) for plate in recording.plates]
     contacts = foot_contacts(recording, ground, foot_markers, plates)
     forward = ground.vectors_to_ground(ground.forward)[[0, 2]]
-    return _Assignment(recording, tuple(foot_markers), contacts, plates, fixed).loads(forward)
+    return _Assignment(recording, tuple(foot_markers), contacts, plates, fixed, forward).loads()
 
 
 def check_assigned(fixed: Mapping[str, str], recording: Recording, bearers: tuple[str, ...]) -> None:
@@ -114,8 +111,10 @@ class _Assignment:
         contacts: dict[str, FootContact],
         plates: list[GroundPlate],
         fixed: dict[str, str],
+        forward: Array,
     ) -> None:
         self.recording, self.feet, self.contacts, self.plates, self.fixed = recording, feet, contacts, plates, fixed
+        self.forward, self.sharing = forward, Sharing.of(list(contacts.values()), plates, forward, recording)
         n, F, P = recording.n_frames, len(feet), len(plates)
         owners = [fixed.get(plate.name) for plate in plates]
         self.given = {p: owner for p, owner in enumerate(owners) if owner is not None and owner not in feet}
@@ -164,18 +163,25 @@ class _Assignment:
         """Which plates carry each stance of one foot."""
         for stance in foot.stances:
             inside, reach = slice(*stance), foot.padded(stance, self.recording.rate)
-            mine = []
+            mine, shares = [], []
             for p, plate in enumerate(self.plates):
                 if self.fixed.get(plate.name, self.feet[k]) != self.feet[k]:
                     continue
                 loaded = plate.loaded[inside]
                 enough = 0.5 * max(int(np.count_nonzero(loaded)), 1)
-                close = self.under[inside, k, p] | self.between(k, p)[inside] | self.upon(plate, foot, inside)
+                close = self.under[inside, k, p] | self.upon(plate, foot, inside)
+                if (self.sharing.between[inside, p] & partly_on(plate, foot)[inside]).any():
+                    shares.append(p)
+                if self.sharing.beside[reach, p].any():
+                    mine.append(p)
+                    self.on[reach, k, p] |= self.sharing.beside[reach, p]
                 if np.count_nonzero(close & loaded) > enough:
                     mine.append(p)
                     self.on[reach, k, p] |= plate.loaded[reach] & (self.under[reach, k, p] | foot.stands[reach])
                     self.on[inside, k, p] = True
-            if not mine:
+            for p in [] if mine else shares:
+                self.on[inside, :, p] |= self.sharing.between[inside, p, None]
+            if not mine and not shares:
                 self.off[reach, k] = True
             else:
                 self.off[inside, k] |= self.beyond_edges(foot, inside)
@@ -204,10 +210,10 @@ class _Assignment:
                 if (foot := self.contacts.get(self.feet[k])) is None:
                     continue
                 for stance in foot.stances:
-                    start, stop = max(first, stance[0]), min(end, stance[1])
-                    if start < stop and self.on[start:stop, k, p].any():
+                    reach = foot.padded(stance, self.recording.rate)
+                    if self.on[max(first, reach.start) : min(end, reach.stop), k, p].any():
                         before, after = round(EARLY_S * self.recording.rate), round(LATE_S * self.recording.rate)
-                        self.on[max(first, stance[0] - before) : min(end, stance[1] + after), k, p] = True
+                        self.on[max(first, reach.start - before) : min(end, stance[1] + after), k, p] = True
 
     def doubtful(self, p: int, plate: GroundPlate) -> None:
         """A press most of whose load is nobody's is nobody's at all: a foot that steps near its centre of pressure at
@@ -265,23 +271,6 @@ class _Assignment:
             )
         return found
 
-    def between(self, k: int, p: int) -> Flags:
-        """Frames in which a plate's centre of pressure lies between two standing feet, and under neither: of presses of
-        which most do, and where some of this foot is on the plate, as far as its edges are known."""
-        others = [c for name, c in self.contacts.items() if name != self.feet[k]]
-        own = self.contacts.get(self.feet[k])
-        if own is None or len(others) != 1:
-            return np.zeros(self.recording.n_frames, dtype=bool)
-        plate, other = self.plates[p], others[0]
-        both = np.concatenate([own.outline, other.outline], axis=1)
-        away = [distance_to_hull(plate.cop, outline) for outline in (own.outline, other.outline, both)]
-        found = (np.fmin(away[0], away[1]) > BETWEEN_M) & (away[2] < BETWEEN_M) & own.stands & other.stands
-        if plate.corners is not None:
-            found &= (plate.beyond(own.outline) < BEYOND_M).any(axis=1)
-        for first, end in runs(plate.pressed):
-            found[first:end] &= 2 * np.count_nonzero(found[first:end]) > np.count_nonzero(plate.loaded[first:end])
-        return np.asarray(found)
-
     def upon(self, plate: GroundPlate, foot: FootContact, frames: slice) -> Flags:
         """Frames in which all touching markers of a foot lie within a plate's edges, on its level, or higher where no
         other foot stands on that: on a box; none where edges are not known."""
@@ -324,11 +313,11 @@ class _Assignment:
             found[:, k] = (foot.aloft & between) | (np.any(others, axis=0) & foot.moves & ~bears)
         return found
 
-    def loads(self, forward: Array) -> FootLoads:
+    def loads(self) -> FootLoads:
         """The loads, and what there is to say of them."""
         contacts = [self.contacts.get(foot) for foot in self.feet]
         marked = np.array([contact is not None for contact in contacts], dtype=bool)
-        soles = Soles.of(contacts, forward, self.recording.rate, self.recording.n_frames)
+        soles = Soles.of(contacts, self.forward, self.recording.rate, self.recording.n_frames)
         loads = divided(self.feet, self.plates, soles, marked, self.on, self.off, self.hidden, self.aloft(), self.given)
         reasons = [*self.off_in_words(), *(text for p in range(len(self.plates)) for text in self.lost_in_words(p))]
         said = [*self.belt_in_words(), *(text for p in range(len(self.plates)) for text in self.owners_in_words(p))]

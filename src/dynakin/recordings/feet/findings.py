@@ -122,8 +122,9 @@ def _off_place(
             continue
         for k, foot in enumerate(contacts):
             assert foot is not None
-            others = np.delete(on, p, axis=2)[press, k].any(axis=1).mean() > 1.0 - TOGETHER
-            shared = np.delete(on[press, :, p], k, axis=1).any(axis=1).mean() > 1.0 - TOGETHER
+            elsewhere = np.asarray(np.delete(on[press], p, axis=2).any(axis=2))  # (T, F)
+            others = elsewhere[:, k].mean() > 1.0 - TOGETHER
+            shared = np.delete(on[press, :, p] & ~elsewhere, k, axis=1).any(axis=1).mean() > 1.0 - TOGETHER
             with_it = foot.stands[press]
             if others or shared or with_it.mean() < TOGETHER or not _covers(foot, first, end):
                 continue

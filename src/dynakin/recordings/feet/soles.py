@@ -90,7 +90,7 @@ class Soles:
             if foot is None:
                 continue
             stood |= foot.stands | ~foot.seen
-            shape = _shape(foot, forward, rate)
+            shape = shape_of(foot, forward, rate)
             spans[k] = spans_of(foot, shape.ends, rate)
             half[k] = shape.half_m
             place = _drawn_on(shape.middle(foot.outline), rate)
@@ -171,6 +171,21 @@ class FootShape:
         right = np.stack([-along[:, 1], along[:, 0]], axis=1)
         return np.asarray(points[:, self.ends[0]] + self.ahead * along + self.aside * right)
 
+    def reach(self, points: Array) -> Array:
+        """(T, C, 2) m corners of where the sole may be among markers (T, K, 2): toes that go on to `LONGEST_M`, and as
+        far around all markers where they do not show how it lies."""
+        if self.ends is None:
+            around = LONGEST_M * np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
+            return np.asarray((points[:, :, None] + around).reshape(len(points), -1, 2))
+        along = points[:, self.ends[1]] - points[:, self.ends[0]]
+        with np.errstate(invalid="ignore"):
+            along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        right = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        half, width = self.half_m
+        middle, front = self.middle(points), max(half, LONGEST_M - half)
+        corners = [middle + x * along + z * right for x in (-half, front) for z in (-width, width)]
+        return np.concatenate([np.stack(corners, axis=1), points], axis=1)
+
     def rolled(self, points: Array, rise: Array) -> tuple[Array, Array]:
         """How far (T, 2) m from the middle of the sole the centre of pressure is expected; its covariance (T, 2, 2).
 
@@ -194,7 +209,12 @@ class FootShape:
         return PRESSURE_REACH * half * at[:, None] * along, covariance
 
 
-def _shape(foot: FootContact, forward: Array, rate: float) -> FootShape:
+def shape_of(foot: FootContact, forward: Array, rate: float) -> FootShape:
+    """The sole among a foot's markers, as they lie while it stands flat.
+
+    Args:
+        forward: (2,) the way the person faces, X and Z of the ground.
+    """
     seen = np.isfinite(foot.outline).all(axis=(1, 2))
     flat = seen & foot.stands if (seen & foot.stands).any() else seen
     shape = FootShape.of(foot.outline[flat], forward)
