@@ -94,6 +94,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     made = path.with_name(f".dynakin-{uuid.uuid4().hex[:8]}{path.suffix}")
     try:
         yield made
+        if path.is_file():
+            made.chmod(path.stat().st_mode)
         made.replace(path)
     except OSError as error:
         error.filename = error.filename and str(path)  # the name that people know

@@ -17,7 +17,7 @@ from dynakin.errors import RecordingError
 from dynakin.filter import plate_motion
 from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
 from dynakin.filter.shear import NO_SHEAR
-from dynakin.messages import about
+from dynakin.messages import about, warnings_of
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.resampling import low_pass
 from dynakin.simulation.trial import simulate as simulate_anew
@@ -66,7 +66,7 @@ def test_plates_that_are_in_step_are_left_alone(data_dir: Path) -> None:
     for recording in (simulate("fullbody", "gait", 7, 4.0).recording, walk):
         ready = person().prepare(recording)
         assert plates_delay(Needed(ready.calibrated, recording.time, ready.markers), ready.wrench[:, :3]) is None
-        assert not any("into step" in text for text in map(str, ready.messages))
+        assert bool(about(ready.messages, "in step")) == (recording is walk)  # 5 ms, as others of this laboratory
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_a_quarter_turn_is_named(data_dir: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda plate: replace(plate, cop=1000.0 * plate.cop), "beyond the nearest marker"),
+        (lambda plate: replace(plate, cop=1000.0 * plate.cop), "has a moment of"),
         (lambda plate: replace(plate, cop=plate.cop + np.array([0.0, 0.0, 0.7])), "away from the nearest foot"),
     ],
 )
@@ -261,7 +261,7 @@ def test_plates_that_were_not_zeroed_in_shear_are_told_and_deviations_hold_it(ea
     whole, ready = person().prepare(squat), person().prepare(with_forces(squat, lambda force: force + off))
     said = [message.text for message in about(ready.messages, "zero")]
     assert len(said) == (each_n > 10.0) and not whole.ground.shear.notes
-    assert not about(ready.messages, "weight")
+    assert not about(warnings_of(ready.messages), "weight")
     assert ready.ground.loads is not None and ready.ground.loads.total_known.all()
     sd = [np.sqrt(each.contacts.covariance[100, 0, 0]) for each in (whole, ready) if each.contacts is not None]
     if said:
@@ -364,8 +364,17 @@ def test_who_judges_takes_plates_in_step_too() -> None:
     assert np.abs(there[both] - before[both])[:, :3].mean() < 2.0
 
 
-def test_where_plates_end_a_frame_before_they_are_not_known() -> None:
+def test_where_plates_end_before_they_are_not_known() -> None:
     whole = simulate("fullbody", "gait", 7, 4.0).recording
     there = brought_into_step(whole, 0.05)
-    assert np.isnan(there.plates[0].force[-4:]).all()  # for a frame the last one is held
-    assert np.isfinite(there.plates[0].force[:-4]).all()
+    assert np.isnan(there.plates[0].force[-3:]).all()  # for 20 ms the last one is held
+    assert np.isfinite(there.plates[0].force[:-3]).all()
+
+
+def test_a_seat_that_nobody_declared_is_no_zero_of_the_plates(data_dir: Path) -> None:
+    """Feet that push against a seat push forward all the time: it was taken for the plates' zero, and no frame left."""
+    folder = data_dir / "opencap_subject4"
+    chair = dynakin.read(folder / "STS1.trc", folder / "STS1_grf.mot")
+    ready = Estimator(load_model("fullbody", Subject(mass_kg=61.0))).prepare(chair)
+    assert not about(ready.messages, "zero") and ready.ground.shear == NO_SHEAR
+    assert np.isfinite(ready.wrench).all(axis=1).sum() > 700

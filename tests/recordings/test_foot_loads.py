@@ -253,4 +253,4 @@ def test_a_plate_beside_one_of_two_flat_feet_is_shared_and_its_place_doubted() -
     wide = replace(recording, markers=recording.markers * [1.0, 1.0, 1.5])
     loads = foot_loads(wide, LABORATORY, MARKERS)
     assert (loads.reason == SHARED).all()
-    assert any("b lies off its place" in text for text in loads.messages)
+    assert any("b lies off its place" in message.text for message in loads.messages)

@@ -18,7 +18,7 @@ def test_it_writes_what_the_api_writes(tmp_path: Path, capsys: pytest.CaptureFix
     options = "--model squat7 --motion sway --seed 3 --duration 4 --sensors laboratory --sensor plate_lag_s=0.01"
     assert main(["simulate", *options.split(), "--spread", "0.5", "--sex", "mean", "-o", str(tmp_path / "cli")]) == 0
     printed = " ".join(capsys.readouterr().out.split())
-    assert "Simulated squat7, seed 3: standing and swaying." in printed
+    assert "Simulated squat7, seed 3: standing and swaying." in printed and "Message(" not in printed
     assert "--model squat7 --mass 70 --height 1.75 -o OUT" in printed
     noise = SensorNoise.laboratory().changed({"plate_lag_s": 0.01})
     trial = simulate("squat7", "sway", 3, 4.0, sex=None, noise=noise, spread=Spread().times(0.5))

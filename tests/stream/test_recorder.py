@@ -257,7 +257,7 @@ def test_what_is_damaged_in_a_recording_is_missing_and_said(magic: bool, squat: 
     assert np.isnan(found.plates[0].force[lost]).all()
     (said,) = found.notes
     assert said.level == "warning" and said.text.endswith("for it: 1.")
-    assert said.text.startswith(f"{tmp_path / 'r' / FILE} is damaged in 1 place (")
+    assert said.text.startswith(f"the recording {tmp_path / 'r' / FILE} is damaged in 1 place (")
     estimate = finish(tmp_path / "r", tmp_path / "out", {"mass_kg": 69.0}).estimate
     assert said in estimate.messages and estimate.config["mass_kg"] == 69.0
 

@@ -80,8 +80,8 @@ def simulate(
         )
         folder = trial.save(output)
     console = out()
-    for note in trial.recording.notes:
-        console.print(note)
+    for said in trial.recording.notes:
+        console.print(str(said))
     console.print(_contents(trial, folder))
     console.print(_how_to_run(trial, folder), soft_wrap=True)
 

@@ -27,6 +27,8 @@ Flags = npt.NDArray[np.bool_]
 
 LONGEST_S, STEP_S = 0.1, 0.005
 """Delays that are looked for, and how finely."""
+HELD_S = 0.02 + 1e-9
+"""The first and the last sample stand for so much before and after."""
 COARSE_S = 0.005
 """Standard deviation of what is found so, half of the step about a right one and what skin does."""
 LEAST_S = 0.016
@@ -85,6 +87,12 @@ class Needed:
     def judged_s(self, force: Array) -> float:
         """How long that is."""
         return float(np.count_nonzero(self.judged(force)) / self.rate)
+
+    def closed(self, force: Array) -> Array:
+        """Forces (T, 3) where the vertical one is what the motion needs within `NEAR`, NaN elsewhere: there something
+        else bears the person, and pushes sideways too."""
+        near = np.abs(force[:, [1]] - self.force[:, [1]]) < NEAR * self.weight
+        return np.where(near, force, np.nan)
 
     def misfit(self, force: Array) -> float:
         """RMS, N, of what forces (T, 3) lack beyond a constant (a mass or a zero that is off), smoothed, where both
@@ -167,9 +175,9 @@ def brought_into_step(recording: Recording, delay_s: float) -> Recording:
 
 
 def _later(time: Array, values: Array, delay_s: float) -> Array:
-    """`in_step` of values (T, 3), but NaN more than a frame beyond the recording."""
-    then, frame = time + delay_s, (1.0 + 1e-9) * float(np.median(np.diff(time)))
-    inside = (then >= time[0] - frame) & (then <= time[-1] + frame)
+    """`in_step` of values (T, 3), but NaN farther than `HELD_S` beyond the recording."""
+    then = time + delay_s
+    inside = (then >= time[0] - HELD_S) & (then <= time[-1] + HELD_S)
     return np.where(inside[:, None], in_step(time, values, delay_s), np.nan)
 
 

@@ -15,7 +15,7 @@ from dynakin.filter.carried import carried_in_hands, carried_in_words
 from dynakin.filter.closure import Closure, closure
 from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
-from dynakin.filter.plate_clock import LEAST_S, SAID, Delay, clock_delay
+from dynakin.filter.plate_clock import Delay, clock_delay
 from dynakin.filter.plate_motion import (
     COARSE_S,
     Needed,
@@ -121,7 +121,7 @@ def known_ground(
     """
     ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance)
     left = clock_delay(initial, recording.time, markers, known) if ground.loads is not None else None
-    if left is None or abs(left.delay_s) < LEAST_S:
+    if left is None or not left.worth_it:
         return ground, known
     delay = Delay(ground.behind_s + left.delay_s, left.sd_s)
     return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
@@ -174,7 +174,7 @@ def _known_ground(
         elif not initial.contacts and (load_kg := carried_in_hands(needed, initial, markers, total)) is not None:
             by_motion.append(warning("carried", carried_in_words(load_kg)))
         elif not initial.contacts:
-            shear = found_shear(needed, total)
+            shear = found_shear(needed, needed.closed(total))
             by_motion += shear.notes
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
     judged = _judged(recording, initial, markers, shear.zeroed(wrench), loads, check, may, by_plate, tolerance)
@@ -322,13 +322,12 @@ def _brought_into_step(
     assigned: Mapping[str, str] | None,
     tolerance: float | None,
 ) -> tuple[Ground, Array]:
-    """`known_ground` of what the plates say so much later, with a sentence on it where it is not by chance."""
+    """`known_ground` of what the plates say so much later, with a sentence on it."""
     there = brought_into_step(recording, delay.delay_s)
     wrench = initial.ground.wrench_to_ground(there.total_wrench())
     ground, known = _known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
     words = f"{out_of_step_in_words(*delay)}; they were brought into step."
-    said = [note("in step", words)] if abs(delay.delay_s) > SAID * delay.sd_s else []
-    return replace(ground, notes=(*said, *ground.notes), behind_s=delay.delay_s), known
+    return replace(ground, notes=(note("in step", words), *ground.notes), behind_s=delay.delay_s), known
 
 
 def _nearly_all(found: Closure) -> bool:

@@ -162,7 +162,7 @@ class Recording:
         check_markers(where, self.time, self.marker_names, self.markers)
         for plate in self.plates:
             check_wrench(plate.name, self.time, plate.force, plate.moment, where)
-            check_place(plate.name, self.time, plate.force, plate.moment, plate.cop, where)
+            check_place(plate.name, self.time, plate.force, plate.moment, plate.cop, str(self.plates_file))
 
     def __repr__(self) -> str:
         return (

@@ -98,14 +98,8 @@ def find_mass(
         if mass_kg:
             return mass_kg, [note("mass", f"Mass {mass_kg:.2f} kg: from the file {recording.name}.")]
     for mass, name in means:
-        doubt = (
-            f"mass {mass:.2f} kg from {name}; wrong where anything but the plates bears the person. Give the mass "
-            "if it is known."
-        )
-        return mass, [
-            note("mass", f"Mass {mass:.2f} kg: from the plates while the person moves."),
-            warning("mass", doubt),
-        ]
+        text = f"Mass {mass:.2f} kg: from {name}; wrong where anything but the plates bears the person."
+        return mass, [note("mass", text)]
     if height_m is not None and not any(recording.plates for recording, _ in trials):
         mass = MEAN_BODY_MASS_INDEX * height_m**2
         doubt = (

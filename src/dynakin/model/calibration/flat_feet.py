@@ -85,7 +85,7 @@ def never_flat(
                 warning(
                     "ankles",
                     f"nothing shows the sole flat of {listed(feet)} ({how}): the zero of the ankle's angle may be "
-                    f"{off_deg} deg off. Give a standing trial with flat feet (--static).",
+                    f"{off_deg} deg off.",
                 )
             )
     return found

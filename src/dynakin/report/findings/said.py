@@ -26,7 +26,11 @@ _KINDS = (
     ),
     _Kind("Guessed marker places", ("guessed",), "Correct the places that are wrong, and give that marker set."),
     _Kind("Joint centres", ("joints",), "Give a standing trial with markers on knees and ankles (--static)."),
-    _Kind("Mass", ("weight",), "Give the mass as weighed, with all that is worn."),
+    _Kind(
+        "Mass",
+        ("weight",),
+        "Give the mass as weighed, with all that is worn; what else bears or pulls the person is declared (--contact).",
+    ),
     _Kind("Subject", ("mass", "height", "sex"), "Give the mass and the height as measured (--mass, --height)."),
     _Kind(
         "Model scaling",

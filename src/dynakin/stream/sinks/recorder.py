@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import OutputError, RecordingError
-from dynakin.messages import warning
+from dynakin.messages import note, warning
 from dynakin.pipeline.result import Result
 from dynakin.pipeline.stages import run_case
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
@@ -240,10 +240,11 @@ def _recording(found: Recorded, folder: str | Path) -> Recording:
     when = ", ".join(_when(hole) for hole in found.holes[:_NAMED])
     when += f" and {count - _NAMED} more" * (count > _NAMED)
     text = (
-        f"{Path(folder) / FILE} is damaged in {count} place{'s' * (count > 1)} ({when}): what was recorded "
-        f"there cannot be read; frames of markers that are missing for it: {lost}."
+        f"the recording {Path(folder) / FILE} is damaged in {count} place{'s' * (count > 1)} ({when}): what was "
+        f"recorded there cannot be read; frames of markers that are missing for it: {lost}."
     )
-    return replace(filled, notes=(*filled.notes, warning("recording", text)))
+    said = warning("recording", text) if lost else note("recording", text)
+    return replace(filled, notes=(*filled.notes, said))
 
 
 def _when(hole: Hole) -> str:
