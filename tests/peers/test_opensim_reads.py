@@ -31,7 +31,7 @@ def test_motion_tables_in_degrees(folder: Path, estimate: Estimate, name: str) -
     np.testing.assert_allclose(table.getIndependentColumn(), estimate.time, atol=1e-12)
     values = estimate.data[Path(name).stem].values.copy()
     values[:, estimate.is_rotation()] = np.degrees(values[:, estimate.is_rotation()])
-    np.testing.assert_allclose(table.getMatrix().to_numpy(), values, rtol=5e-8)
+    np.testing.assert_allclose(table.getMatrix().to_numpy(), values, rtol=5e-6, atol=1e-5)
 
 
 def test_storage_turns_the_coordinates_back_into_radians(folder: Path, estimate: Estimate) -> None:
@@ -43,7 +43,7 @@ def test_storage_turns_the_coordinates_back_into_radians(folder: Path, estimate:
 def test_moments(folder: Path, estimate: Estimate) -> None:
     table = opensim.TimeSeriesTable(str(folder / "moments.sto"))
     assert list(table.getColumnLabels())[2] == "knee_moment"
-    np.testing.assert_allclose(table.getMatrix().to_numpy(), estimate.data["moments"].values, rtol=5e-8)
+    np.testing.assert_allclose(table.getMatrix().to_numpy(), estimate.data["moments"].values, rtol=5e-6, atol=1e-5)
 
 
 def test_moments_that_are_not_known_are_gaps(estimate: Estimate, tmp_path: Path) -> None:
@@ -54,7 +54,7 @@ def test_moments_that_are_not_known_are_gaps(estimate: Estimate, tmp_path: Path)
     table = opensim.TimeSeriesTable(str(tmp_path / "moments.sto"))
     expected = data["moments"].values.copy()
     expected[5, 2] = np.nan
-    np.testing.assert_allclose(table.getMatrix().to_numpy(), expected, rtol=5e-8, equal_nan=True)
+    np.testing.assert_allclose(table.getMatrix().to_numpy(), expected, rtol=5e-6, atol=1e-5, equal_nan=True)
     # The older Storage class has no word for a gap: it ends at the first one, whatever stands there (docs/formats.md).
     assert opensim.Storage(str(tmp_path / "moments.sto")).getSize() < len(estimate.time)
 
@@ -63,7 +63,7 @@ def test_wrench(folder: Path, estimate: Estimate) -> None:
     table = opensim.TimeSeriesTable(str(folder / "wrench.sto"))
     column = table.getDependentColumn("fy_estimated").to_numpy()
     expected = estimate.data["wrench_estimated"].sel(component="fy").values
-    np.testing.assert_allclose(column, expected, rtol=5e-8)
+    np.testing.assert_allclose(column, expected, rtol=5e-6, atol=1e-5)
 
 
 def test_markers_in_their_own_unit_with_gaps(folder: Path, estimate: Estimate) -> None:
@@ -73,7 +73,7 @@ def test_markers_in_their_own_unit_with_gaps(folder: Path, estimate: Estimate) -
     expected = 1000.0 * laboratory_markers(estimate)
     flat = table.flatten()  # kept: what it gives out is a view of it
     values = flat.getMatrix().to_numpy().reshape(expected.shape)
-    np.testing.assert_allclose(values, expected, atol=1e-6, equal_nan=True)
+    np.testing.assert_allclose(values, expected, atol=6e-4, equal_nan=True)
     assert np.isnan(values).any()
 
 
@@ -83,4 +83,4 @@ def test_tables_of_the_body(folder: Path, estimate: Estimate, name: str) -> None
     assert table.getNumRows() == len(estimate.time)
     if name == "powers.sto":
         assert list(table.getColumnLabels()) == [f"{c}_power" for c in estimate.coordinate_names]
-        np.testing.assert_allclose(table.getMatrix().to_numpy(), estimate.powers(), rtol=5e-8)
+        np.testing.assert_allclose(table.getMatrix().to_numpy(), estimate.powers(), rtol=5e-6, atol=1e-5)

@@ -50,7 +50,7 @@ def estimated(folder: Path, name: str, model: str, mass: float, out: Path) -> tu
 
 def exported(definition: Definition, estimate: Estimate, tracker: Tracker, path: Path) -> Any:
     """The model that the run ended with, as OpenSim loads it."""
-    found = read_constants(path.with_name("parameters.json"))
+    found = read_constants(path.with_name("out") / "parameters.json")
     if isinstance(definition, OpenSimDefinition):
         write_osim(of_definition(definition, found, estimate.mass_kg), path)
     else:
