@@ -11,8 +11,11 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import load_model
+from dynakin.recordings.feet.contact import SHARED_PLATE
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
+from dynakin.report.findings.forces import moments
+from dynakin.results.measures.metrics import compute_metrics
 from support.made_in_space import RATE, definition, measured, recording_of, standing, standing_places, states
 
 LABORATORY = GroundFrame(np.eye(3), np.zeros(3), "+Y", np.array([1.0, 0.0, 0.0]))
@@ -128,6 +131,11 @@ def test_the_filter_follows_a_moving_body_at_any_heading_without_knowing_which()
         assert np.rad2deg(np.sqrt(np.mean(error**2))) < 1.5, name
     assert np.isfinite(result.data["state"].values).all()
     assert any("Both feet stand on plate 1" in text for text in map(str, result.messages))
+    contact = result.data["foot_contact"].copy(data=np.full(result.data["foot_contact"].shape, SHARED_PLATE, np.uint8))
+    shared = replace(result, data=result.data.assign(foot_contact=contact))
+    said = moments(shared, compute_metrics(result))
+    assert said is not None and said.level == "warning" and "plate of its own" in said.advice
+    assert said.text.startswith("The right and the left foot shares a plate whenever it stands")
     assert not [event for event in result.events if event.kind == "reset"]
 
 

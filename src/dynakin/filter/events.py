@@ -62,7 +62,11 @@ def _refused(data: xr.Dataset) -> list[Event]:
         event
         for k, name in enumerate(names)
         for event in _stretches(
-            data["time"].values, verdicts[:, k] == REFUSED, "gated", name, "contradicts all else, not used"
+            data["time"].values,
+            verdicts[:, k] == REFUSED,
+            "gated",
+            name,
+            f"contradict{'s' * (name != 'plates')} all else, not used",
         )
     ]
 

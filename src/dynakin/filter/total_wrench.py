@@ -404,9 +404,9 @@ def _undeclared_in_words(
         warning(
             "plates",
             f"the plates carry up to {abs(size):.0f} N {'less' if size > 0.0 else 'more'} "
-            f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({abs(size) / weight:.0%} of the weight, "
-            f"expected within {found.limits[0]:.0%}, and {found.limits[1]:.0%} for longer than a second): something "
-            "that no plate measures bears or pulls the person there (a seat, a "
+            f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({100.0 * abs(size) / weight:.0f} % of "
+            f"the weight, expected within {100.0 * found.limits[0]:.0f} %, and {100.0 * found.limits[1]:.0f} % for "
+            "longer than a second): something that no plate measures bears or pulls the person there (a seat, a "
             f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The plates' sum is not used there.",
         )
     ), beyond

@@ -319,8 +319,10 @@ class _Assignment:
         marked = np.array([contact is not None for contact in contacts], dtype=bool)
         soles = Soles.of(contacts, self.forward, self.recording.rate, self.recording.n_frames)
         loads = divided(self.feet, self.plates, soles, marked, self.on, self.off, self.hidden, self.aloft(), self.given)
-        reasons = [*self.off_in_words(), *(text for p in range(len(self.plates)) for text in self.lost_in_words(p))]
-        said = [*self.belt_in_words(), *(text for p in range(len(self.plates)) for text in self.owners_in_words(p))]
+        every = range(len(self.plates))
+        reasons = [*self.off_in_words(), *(text for p in every for text in self.shared_in_words(p))]
+        reasons += [text for p in every for text in self.lost_in_words(p)]
+        said = [*self.belt_in_words(), *(text for p in every for text in self.owners_in_words(p))]
         own = [p for p in range(len(self.plates)) if p not in self.given]
         said += plate_findings(
             self.recording.time, self.feet, contacts, [self.plates[p] for p in own], soles, self.on[:, :, own]
@@ -381,17 +383,17 @@ class _Assignment:
                 found.append(
                     note("plates", f"{plate.name} carries the {foot} foot ({how}): {self.spans(owners[:, k])}.")
                 )
-        both = np.flatnonzero(owners.sum(axis=1) > 1)
-        if len(both):
-            time = self.recording.time
-            found.append(
-                note(
-                    "plates",
-                    f"Both feet stand on {plate.name} in {len(both)} frames from {time[both[0]]:.2f} to "
-                    f"{time[both[-1]]:.2f} s: its wrench is divided between them by where each one's load is expected.",
-                )
-            )
         return found
+
+    def shared_in_words(self, p: int) -> list[Message]:
+        both = self.on[:, :, p].sum(axis=1) > 1
+        if not both.any():
+            return []
+        text = (
+            f"Both feet stand on {self.plates[p].name} in {np.count_nonzero(both)} frames, {self.spans(both)}: how "
+            "they divide its load is assumed."
+        )
+        return [note("plates", text)]
 
     def lost_in_words(self, p: int) -> list[Message]:
         plate, time = self.plates[p], self.recording.time

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dynakin.messages import about
+from dynakin.recordings.feet.contact import NO_CONTACT, SHARED_PLATE
 from dynakin.report.findings.finding import Insight, Metrics
 from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.results.estimate import Estimate
@@ -34,9 +35,25 @@ def moments(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if len(found["reasons"]) > 3:
         text.append(f"{plural(len(found['reasons']) - 3, 'more reason')} under Joint moments.")
     advice = "Give the forces of every contact (--forces), and plates under every step that is to be judged."
+    shared, always = _sharing(estimate)
+    if shared:
+        advice = "Record it with each foot on a plate of its own."
+    if always:
+        feet = " and ".join(f"the {name}" for name in always)
+        text.insert(0, f"{sentence(feet)} foot shares a plate whenever it stands: moments are guesses then.")
     # steps off the plates are usual and flagged; a leg without a measured frame is not what was recorded for
-    missed = any(not count["measured"] for count in found["legs"].values())
+    missed = always or any(not count["measured"] for count in found["legs"].values())
     return Insight("warning" if missed else "note", "Joint moments", " ".join(text), advice)
+
+
+def _sharing(estimate: Estimate) -> tuple[bool, list[str]]:
+    """Whether any foot shares a plate with another, and those that do whenever they stand."""
+    if "foot_contact" not in estimate.data:
+        return False, []
+    contact = estimate.values("foot_contact")
+    shares, stands = contact == SHARED_PLATE, contact != NO_CONTACT
+    always = shares.any(axis=0) & (shares | ~stands).all(axis=0)
+    return bool(shares.any()), [name for name, own in zip(estimate.contact_names, always, strict=True) if own]
 
 
 def left(estimate: Estimate, metrics: Metrics) -> Insight | None:
