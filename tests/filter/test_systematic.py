@@ -324,6 +324,21 @@ def test_a_clock_that_is_off_moves_moments_by_how_fast_loads_change() -> None:
     np.testing.assert_allclose(live["moments"], recorded["moments_sd"][2], rtol=1e-9)
 
 
+def test_a_recording_without_a_state_that_is_known_has_no_deviations() -> None:
+    data = xr.Dataset(
+        {
+            "state": (("time", "element"), np.full((3, 30), np.nan)),
+            "state_sd": (("time", "element"), np.zeros((3, 30))),
+            "final_covariance": (("element", "element_"), np.zeros((30, 30))),
+            "foot_wrench": (("time", "foot", "component"), np.zeros((3, 1, 6))),
+            "markers_measured": (("time", "marker", "axis"), np.full((3, 12, 3), np.nan)),
+        },
+        coords={"time": 0.01 * np.arange(3), "foot_segment": ("foot", ["shank"])},
+    )
+    parts = systematic().over_time(data)
+    assert all(np.isnan(values).all() for kind in parts.values() for values in kind.values())
+
+
 def test_intensity_is_the_mean_square_of_accelerations_over_their_deviations_of_what_moves() -> None:
     acceleration, sd = np.array([[2.0, 3.0, 5.0], [0.0, 0.0, 1.0]]), np.array([[1.0, 3.0, 0.0], [1.0, 1.0, 0.0]])
     np.testing.assert_allclose(movement_intensity(acceleration, sd), [(4.0 + 1.0) / 2.0, 0.0])

@@ -241,9 +241,8 @@ class Systematic:
         }
         # a load passes from foot to foot within a sample
         rate = np.gradient(wrench, time, axis=0) if len(time) > 1 else np.zeros_like(wrench)
-        known = np.flatnonzero(np.isfinite(states).all(axis=1))
-        moments = found["clock"]["moments"]
-        moments[known] = [self._by_clock(states[k], rate[k], segments) for k in known]
+        for k in np.flatnonzero(np.isfinite(states).all(axis=1)):
+            found["clock"]["moments"][k] = self._by_clock(states[k], rate[k], segments)
         return found
 
     def moments_moved(self, data: xr.Dataset, moved: Sequence[Array]) -> Array:
