@@ -10,11 +10,13 @@ import numpy.typing as npt
 
 from dynakin.filter.closure import plates_misfit
 from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.plate_motion import clock_in_words
 from dynakin.filter.samples import in_step
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
+from dynakin.results.naming import sentence
 
 Array = npt.NDArray[np.float64]
 
@@ -91,9 +93,7 @@ def in_words(shift_s: float, delay: tuple[float, float] | None) -> list[Message]
     """What was found about the plates' clock; empty where nothing was asked."""
     if delay is None:
         return []
-    total, sd = shift_s + delay[0], delay[1]
-    ahead = "behind" if total >= 0.0 else "ahead of"
-    text = f"The plates are {1000.0 * abs(total):.1f} ms {ahead} the markers (standard deviation {1000.0 * sd:.1f} ms)"
+    text = sentence(clock_in_words(shift_s + delay[0], delay[1]))
     if shift_s:
         return [note("in step", f"{text}; they were brought into step.")]
     return [note("sum of the plates", f"{text}.")]

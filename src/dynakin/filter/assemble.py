@@ -62,7 +62,8 @@ def assemble(
     Args:
         arrays: as `_core.Filter.run` returns them, T frames.
         measured: markers (T, M, 3) and wrench (T, 6), as the filter took them.
-        config: what was asked for, as plain data.
+        config: what was asked for, as plain data; "ground": why something is not measured, and by how much the plates
+            were brought into step.
         notes: sentences of the plates' check.
         covariances: P (n, n) before the first frame and after the last.
         used: the noise of the filter. Constants have deviations by the declared variances, without its
@@ -73,7 +74,8 @@ def assemble(
         low_pass: what the markers went through before they were given.
     """
     whole = _dataset(arrays, model, initial, recording, measured, feet)
-    beyond, reasons = None, list(config.get("ground_reasons", ()))
+    ground = {"reasons": [], "plates_behind_s": 0.0} | config.get("ground", {})
+    beyond, reasons = None, list(ground["reasons"])
     if feet is not None:
         weight, forces = initial.weighed_kg * GRAVITY_M_S2, arrays["foot_wrench"]
         soles = list(initial.feet.values())
@@ -112,7 +114,7 @@ def assemble(
     )
     constants = [initial.names.index(p.name) for p in parameters if p.estimated]
     data["state_sd"][:, constants] *= declared[constants]  # one deviation of a constant, wherever it is read
-    config = {key: value for key, value in config.items() if key not in ("ground_reasons", "behind_s")} | {
+    config = config | {
         "mass_kg": initial.mass_kg,
         "height_m": initial.height_m,
         "side": initial.side,
@@ -123,9 +125,9 @@ def assemble(
             "vertical": initial.ground.vertical,
             "forward": initial.ground.forward.tolist(),
             "origin_m": initial.ground.origin_L.tolist(),
-            "reasons": reasons,
-            "plates_behind_s": config.get("behind_s", 0.0),
-        },
+        }
+        | ground
+        | {"reasons": reasons},
     }
     events = events_of(whole, parameters, initial, unseen_limit(used))  # by what the filter itself believes
     if systematic is not None:

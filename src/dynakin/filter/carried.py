@@ -6,11 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import mean_seen
-from dynakin.filter.closure import smoothed
-from dynakin.filter.mass_centre import CUTOFF_HZ
+from dynakin.filter.mass_centre import second_derivative
 from dynakin.filter.plate_motion import Needed
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.resampling import low_pass
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -39,12 +37,11 @@ def carried_in_hands(needed: Needed, initial: CalibratedModel, markers: Array, f
             return None
         frames = np.arange(len(path))
         whole = np.stack([np.interp(frames, frames[seen], path[seen, axis]) for axis in range(3)], axis=1)
-        hands.append(_acceleration(whole, needed.rate))
+        hands.append(second_derivative(whole, needed.rate))
     excess = force - needed.force
     # of 1 kg in both hands that was taken for a part of the body
     moves = np.mean(hands, axis=0) + np.array([0.0, GRAVITY_M_S2, 0.0]) - needed.force / initial.weighed_kg
-    judged = needed.judged(force)
-    both = smoothed(np.where(judged[:, None], np.hstack([excess, moves]), 0.0), judged, needed.rate)[judged]
+    both = needed.smoothed(np.hstack([excess, moves]), force)
     both -= both.mean(axis=0)
     lacks, moved = both[:, :3].ravel(), both[:, 3:].ravel()
     if not moved.any():
@@ -60,8 +57,3 @@ def carried_in_words(carried_kg: float) -> str:
         f"the plates' force moves as if about {carried_kg:.0f} kg were carried in the hands, which the model does not "
         "have: moments of shoulders, elbows, back and hips are wrong by that."
     )
-
-
-def _acceleration(path: Array, rate: float) -> Array:
-    smooth = low_pass(path, rate, CUTOFF_HZ)
-    return np.asarray(np.gradient(np.gradient(smooth, 1.0 / rate, axis=0), 1.0 / rate, axis=0))

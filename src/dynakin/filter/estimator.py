@@ -300,8 +300,8 @@ class Estimator:
                 arrays = arrays if skin is None else skin.put_back(arrays)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        reasons = [reason.text for reason in ground.reasons]
-        config = self.settings() | {"lag_s": lag_s, "ground_reasons": reasons, "behind_s": ground.behind_s}
+        found_of = {"reasons": [reason.text for reason in ground.reasons], "plates_behind_s": ground.behind_s}
+        config = self.settings() | {"lag_s": lag_s, "ground": found_of}
         doubt = clock if ground.usable else []
         if ready.doubt:
             unsought = " No further delay of the plates is sought, because a wrong mass looks like one."

@@ -87,7 +87,7 @@ def mass_centre(initial: CalibratedModel, time: Array, markers: Array) -> MassCe
             path = np.einsum("m,tma->ta", own, bridged[lo:hi][:, use])
             inner = slice(max(a, lo + end), min(b, hi - end))
             found.path[a:b] = path[a - lo : b - lo]
-            found.acceleration[a:b] = _second_derivative(path, rate)[a - lo : b - lo]
+            found.acceleration[a:b] = second_derivative(path, rate)[a - lo : b - lo]
             found.known[inner] = True
     return found if found.known.any() else None
 
@@ -114,7 +114,8 @@ def _bridged(time: Array, markers: Array, axes: Flags, rate: float) -> tuple[Arr
     return filled, known
 
 
-def _second_derivative(path: Array, rate: float) -> Array:
+def second_derivative(path: Array, rate: float) -> Array:
+    """Of a path (T, ...), low-passed before it is differentiated."""
     smooth = low_pass(path, rate, CUTOFF_HZ)
     return np.asarray(np.gradient(np.gradient(smooth, 1.0 / rate, axis=0), 1.0 / rate, axis=0))
 

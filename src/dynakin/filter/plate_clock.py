@@ -84,9 +84,7 @@ def clock_delay(initial: CalibratedModel, time: Array, markers: Array, wrench: A
     if not stretches:
         return None
     body = _Body(initial)
-    judged = [(part, need) for part in stretches if (need := body.needed(markers[part], rate / part.step)) is not None]
-    if not judged:
-        return None
+    judged = [(part, body.needed(markers[part], rate / part.step)) for part in stretches]
     noise = weight * np.repeat([FORCE, MOMENT_M], 3)
     prior_sd = np.concatenate([[WIDE_S], body.inertia_sd, OFFSET * noise])
     delay, variance = 0.0, np.inf
@@ -141,12 +139,9 @@ class _Body:
         known = [_unsure(np.array(segment.inertia)) for segment in segments if segment.inertia[0] > 0.0]
         self.inertia_sd = np.concatenate(known)
 
-    def needed(self, markers: Array, rate: float) -> _Needed | None:
-        """Of a stretch of markers (T, M, 3); None where some frame shows too few."""
-        q = inverse_kinematics(self._initial, markers)
-        if not np.isfinite(q).all():
-            return None
-        q = low_pass(q, rate, CUTOFF_HZ)
+    def needed(self, markers: Array, rate: float) -> _Needed:
+        """Of a stretch of markers (T, M, 3), each frame of which shows enough."""
+        q = low_pass(inverse_kinematics(self._initial, markers), rate, CUTOFF_HZ)
         qd = np.gradient(q, 1.0 / rate, axis=0)
         motion = np.hstack([q, qd, np.gradient(qd, 1.0 / rate, axis=0)])
         wrench, by_inertia = np.empty((len(q), 6)), np.empty((len(q), 6, len(self._inertia)))

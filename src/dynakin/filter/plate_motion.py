@@ -88,6 +88,11 @@ class Needed:
         """How long that is."""
         return float(np.count_nonzero(self.judged(force)) / self.rate)
 
+    def smoothed(self, values: Array, force: Array) -> Array:
+        """Values (T, C), smoothed over the frames in which both this and forces (T, 3) are known, at these."""
+        judged = self.judged(force)
+        return smoothed(values, judged, self.rate)[judged]
+
     def closed(self, force: Array) -> Array:
         """Forces (T, 3) where the vertical one is what the motion needs within `NEAR`, NaN elsewhere: there something
         else bears the person, and pushes sideways too."""
@@ -99,9 +104,7 @@ class Needed:
         are known; inf where these frames are too few."""
         if not self.judged_s(force) >= _SHORTEST_S:  # a rate that is NaN, too
             return float("inf")
-        judged = self.judged(force)
-        lacks = smoothed(np.where(judged[:, None], self.force - force, 0.0), judged, self.rate)[judged]
-        return float(np.sqrt(np.sum(lacks.var(axis=0))))
+        return float(np.sqrt(np.sum(self.smoothed(self.force - force, force).var(axis=0))))
 
 
 def plates_delay(needed: Needed, force: Array) -> float | None:
@@ -122,21 +125,25 @@ def plates_delay(needed: Needed, force: Array) -> float | None:
 
 def out_of_step_in_words(delay_s: float, sd_s: float) -> str:
     """Which way, and by how much."""
-    where = "behind" if delay_s > 0.0 else "ahead of"
+    return f"By the motion {clock_in_words(delay_s, sd_s)}"
+
+
+def clock_in_words(delay_s: float, sd_s: float) -> str:
+    """How far the plates lag behind the markers, or run ahead of them."""
+    where = "behind" if delay_s >= 0.0 else "ahead of"
     return (
-        f"By the motion the plates are {1000.0 * abs(delay_s):.1f} ms {where} the markers (standard deviation "
-        f"{1000.0 * sd_s:.1f} ms)"
+        f"the plates are {1000.0 * abs(delay_s):.1f} ms {where} the markers (standard deviation {1000.0 * sd_s:.1f} ms)"
     )
 
 
 def fitting_rate(needed: Needed, force: Array) -> tuple[float, float] | None:
     """The rate, Hz, at which the accelerations by the markers would be those by the plates' sum (T, 3) N, and these
     over the former as they are; None where the rate fits, or nothing can be said."""
-    judged, seconds = needed.judged(force), needed.judged_s(force)
+    seconds = needed.judged_s(force)
     if not needed.whole or not (seconds >= _HALF_STRIDE_S and needed.rate >= SLOWEST_HZ):  # a rate that is NaN, too
         return None
     upward = np.stack([needed.force[:, 1] - needed.weight, force[:, 1]], axis=1)
-    moved, carried = smoothed(np.where(judged[:, None], upward, 0.0), judged, needed.rate)[judged].T
+    moved, carried = needed.smoothed(upward, force).T
     if carried.std() < VIGOROUS * needed.weight or not moved.std() > 0.0:
         return None
     follows = float(np.corrcoef(moved, carried)[0, 1])

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.closure import smoothed
 from dynakin.filter.plate_motion import Needed
 from dynakin.messages import Message, warning
 
@@ -97,8 +96,7 @@ def _gain(needed: Needed, force: Array) -> float | None:
     """Of the axis of the ground whose force is farther off what the motion needs."""
     if not (needed.whole and needed.judged_s(force) >= GAIN_S):
         return None
-    judged, found = needed.judged(force), []
-    both = smoothed(np.where(judged[:, None], np.hstack([needed.force, force]), 0.0), judged, needed.rate)[judged]
+    found, both = [], needed.smoothed(np.hstack([needed.force, force]), force)
     for axis in (0, 2):
         moved, carried = both[:, axis], both[:, 3 + axis]
         if moved.std() < VIGOROUS * needed.weight or not carried.any():

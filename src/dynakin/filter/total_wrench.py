@@ -373,7 +373,7 @@ def _undeclared_in_words(
             warning(
                 "weight",
                 f"the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
-                f"(by the motion {load + float(np.nanmean(found.excess[judged, 1])) / GRAVITY_M_S2:.1f} kg): the mass "
+                f"(by the motion {load + up / GRAVITY_M_S2:.1f} kg): the mass "
                 "is wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, "
                 f"a weight, a cable, a rail){unit}. The plates are not used for the total.",
             )

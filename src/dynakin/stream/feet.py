@@ -27,7 +27,7 @@ from dynakin.recordings.feet.contact import (
 )
 from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
-from dynakin.recordings.feet.sharing import BETWEEN_M, SHORTEST_S, beside_m
+from dynakin.recordings.feet.sharing import BETWEEN_M, SHORTEST_S, beside_m, lies_between
 from dynakin.recordings.feet.soles import FootShape, Soles
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate, level_pressure
@@ -343,8 +343,8 @@ class LiveFeet:
             shapes = self._soles_among(outlines)
             soles = [shapes[f].reach(outlines[[f]][:, self._seen(f)]) for f in range(2)]
             corners = [np.repeat(sole, len(plates), axis=0) for sole in (*soles, np.concatenate(soles, axis=1))]
-            right, left, both = (distance_to_hull(cops, sole) for sole in corners)
-            found &= (np.fmin(right, left) > beside) & (both < beside)
+            *each, within = (distance_to_hull(cops, sole) for sole in corners)
+            found &= lies_between(each, within, beside)
         self._beside = np.where(found, np.fmin(self._beside, self._time), np.inf)
         return np.asarray(self._time - self._beside >= SHORTEST_S)
 

@@ -54,9 +54,9 @@ def find_mass(
     pelvis: Sequence[str] = (),
     height_m: float | None = None,
 ) -> tuple[float, list[Message]]:
-    """Mass (kg) and where it comes from: given, from the plates while standing still, from the file, or, with a
-    warning, from the plates' mean over a movement that is long and steady enough, or from their impulse while they
-    bear all of the person.
+    """Mass (kg) and where it comes from: given, from the plates while standing still, from the file, or from
+    the plates' mean over a movement that is long and steady enough, or from their impulse while they bear all of the
+    person.
 
     Args:
         pelvis: the recordings' names of the markers on it; its vertical speed stands for that of the centre of mass.

@@ -63,17 +63,21 @@ class Sharing:
             return cls(beside, between)
         markers = [foot.outline for foot in feet]
         soles = [shape_of(foot, forward, rate).reach(foot.outline) for foot in feet]
+        all_markers, all_soles = (np.concatenate(each, axis=1) for each in (markers, soles))
         bear = np.stack([foot.bears(rate) for foot in feet])
         both, flat = bear.all(axis=0), np.all([foot.touching.all(axis=1) for foot in feet], axis=0)
         shortest = SHORTEST_S * rate if n > 1 else 1  # one frame has no rate
         for p, plate in enumerate(plates):
             judged = plate.push > JUDGED_N
-            away = np.where(bear, [distance_to_hull(plate.cop, sole) for sole in soles], np.inf).min(axis=0)
-            off = _off_its_place(plate, np.where(both, np.nan, away))
-            under_neither = both & _lies_between(plate.cop, soles, beside_m(plate.push) + off)
+            from_soles = [distance_to_hull(plate.cop, sole) for sole in soles]
+            off = _off_its_place(plate, np.where(both, np.nan, np.where(bear, from_soles, np.inf).min(axis=0)))
+            within = distance_to_hull(plate.cop, all_soles)
+            under_neither = both & lies_between(from_soles, within, beside_m(plate.push) + off)
             for first, end in runs(under_neither):
                 beside[first:end, p] = end - first >= shortest
-            between[:, p] = flat & judged & _lies_between(plate.cop, markers, BETWEEN_M + off)
+            from_markers = [distance_to_hull(plate.cop, outline) for outline in markers]
+            within = distance_to_hull(plate.cop, all_markers)
+            between[:, p] = flat & judged & lies_between(from_markers, within, BETWEEN_M + off)
             for first, end in runs(plate.pressed):
                 most = 2 * np.count_nonzero(between[first:end, p]) > np.count_nonzero(judged[first:end])
                 beside[first:end, p] |= most & between[first:end, p]
@@ -93,12 +97,11 @@ def beside_m(push: Array) -> Array:
     return np.where(push > JUDGED_N, BESIDE_M + PRESSURE_NM / np.maximum(push, JUDGED_N), np.inf)
 
 
-def _lies_between(cop: Array, outlines: Sequence[Array], limit_m: Array | float) -> Flags:
-    """(T,) frames in which a centre of pressure (T, 2) lies further than that from both outlines, but not so far from
-    the area that they span."""
-    away = [distance_to_hull(cop, outline) for outline in (*outlines, np.concatenate(outlines, axis=1))]
+def lies_between(away: Sequence[Array], from_both: Array, limit_m: Array | float) -> Flags:
+    """Whether centres of pressure lie further than that from both of two outlines, but not so far from the area that
+    they span: by their distances from each, and from that."""
     with np.errstate(invalid="ignore"):
-        return np.asarray((np.fmin(away[0], away[1]) > limit_m) & (away[2] < limit_m))
+        return np.asarray((np.fmin(away[0], away[1]) > limit_m) & (from_both < limit_m))
 
 
 def _off_its_place(plate: GroundPlate, away: Array) -> Array:
