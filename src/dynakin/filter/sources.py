@@ -17,11 +17,11 @@ from dynakin.results.measures.sources import (
     ABSENT,
     DERIVED,
     MEASURED,
-    UNSEEN_S,
     Hidden,
     contact_sources,
     out_of_sight,
     plates_refused,
+    too_long,
 )
 
 if TYPE_CHECKING:
@@ -117,20 +117,15 @@ class LiveSight:
         owners = [marker.segment for marker in spec.markers]
         self._segments = list(dict.fromkeys(owners))
         self._own = np.array([[owner == segment for owner in owners] for segment in self._segments], dtype=bool)
-        self._since = np.full(len(self._segments), np.nan)  # when it was lost; nan: it is seen, or never was
-        self._ever = np.zeros(len(self._segments), dtype=bool)
-        self._seen_s = np.full(len(owners), -np.inf)
+        self._lost_s = np.full(len(owners), -np.inf)  # when each was lost; inf: it is seen, -inf: it never was
         self.used = np.zeros(len(owners), dtype=bool)  # `in_use`
 
     def look(self, time_s: float, markers: Array) -> Hidden:
         """Segment -> (1,) whether it is out of sight at this time, by the markers (M, 3); empty where none is."""
-        now = np.isfinite(markers).any(axis=1)
-        self._seen_s[now] = time_s
-        self.used = time_s - self._seen_s <= UNSEEN_S + 1e-9
-        seen = (self._own & now).any(axis=1)
-        self._ever |= seen
-        self._since = np.where(seen | ~self._ever, np.nan, np.fmin(self._since, time_s))
-        hidden = time_s - self._since > UNSEEN_S + 1e-9
+        self._lost_s = np.where(np.isfinite(markers).any(axis=1), np.inf, np.minimum(self._lost_s, time_s))
+        self.used = ~too_long(time_s - self._lost_s)
+        last = np.where(self._own, self._lost_s, -np.inf).max(axis=1)  # of each segment's markers
+        hidden = too_long(time_s - last) & np.isfinite(last)
         return dict(zip(self._segments, hidden[:, None], strict=True)) if hidden.any() else {}
 
 

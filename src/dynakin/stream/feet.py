@@ -27,7 +27,7 @@ from dynakin.recordings.feet.contact import (
 )
 from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
-from dynakin.recordings.feet.sharing import BETWEEN_M, SHORTEST_S, beside_m, lies_between
+from dynakin.recordings.feet.sharing import BETWEEN_M, SHORTEST_S, beside_m, lies_between, mostly
 from dynakin.recordings.feet.soles import FootShape, Soles
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate, level_pressure
@@ -91,7 +91,8 @@ class LiveFeet:
         self._floor_m = float(initial.ground.points_to_ground(np.zeros(3))[1])  # streams put plates there, too
         self._touched = np.full(F, -np.inf)  # when the foot last stood
         self._near, self._loaded = np.zeros((F, P), dtype=int), np.zeros((F, P), dtype=int)  # frames of this stance
-        self._between, self._press = np.zeros(P, dtype=int), np.zeros(P, dtype=int)  # frames of this press
+        self._flat = np.zeros(F, dtype=bool)  # all of its markers touch
+        self._between, self._judged = np.zeros(P, dtype=int), np.zeros(P, dtype=int)  # frames of this press
         self._beside = np.full(P, np.inf)  # since when it presses between two soles
         self._shared = np.zeros((F, P), dtype=bool)  # it has, since this foot stands and this plate is pressed
         self._owners = np.zeros((F, P), dtype=bool)  # of the plates that are pressed
@@ -256,6 +257,7 @@ class LiveFeet:
         touching = slow & (np.abs(own_height - self._level[:, None]) < NEAR_SUPPORT_M)
         touching |= slow & (own_height < NEAR_SUPPORT_M)
         self._touched[touching.any(axis=1)] = time_s
+        self._flat = (touching | (self._own == len(places))).all(axis=1) & self._marked
         low = ((own_height < ALOFT_M) | (np.abs(own_height - self._level[:, None]) < ALOFT_M)).any(axis=1)
         moves = self._marked & ~slow.any(axis=1)
         return np.vstack([places[:, [0, 2]], np.full(2, np.nan)])[self._own], low, moves
@@ -287,8 +289,8 @@ class LiveFeet:
         ]
 
     def _majority(self) -> Flags:
-        """(F, P) plates that carry a stance, as far as it has gone: near for most of the load."""
-        return np.asarray(self._near > 0.5 * self._loaded)
+        """(F, P) plates that carry a stance, as far as it has gone."""
+        return np.asarray(mostly(self._near, self._loaded))
 
     def _assign(self, plates: list[GroundPlate], outlines: Array, bears: Flags, low: Flags) -> None:
         touches = self._touched == self._time
@@ -298,19 +300,13 @@ class LiveFeet:
         away = np.where(np.isnan(away), np.inf, away)  # of a plate that is not loaded
         near = away < NEAR_M
         self._under = near.copy()
-        apart = np.isfinite(away).any(axis=0) & (away.min(axis=0) > BETWEEN_M)
         loaded = np.array([plate.loaded[0] for plate in plates])
-        self._press += loaded
-        if touches.all() and apart.any():
-            both = np.broadcast_to(outlines.reshape(1, -1, 2), (P, outlines.size // 2, 2))
-            between = apart & (distance_to_hull(cops, both) < BETWEEN_M)
-            self._between += between
-            near |= between & (2 * self._between > self._press)
-        self._shared[:, self._press_between(plates, cops, outlines, bears, away.min(axis=0))] = True
+        self._shared[:, self._press_between(plates, cops, outlines, bears, away)] = True
         self._shared &= bears[:, None] & np.array([plate.pressed[0] for plate in plates])
+        shared = self._shared | (bears[:, None] & mostly(self._between, self._judged))
         for p, foot in self._assigned.items():
             near[:, p] = np.arange(F) == foot
-        near[:, list(self._given)] = self._shared[:, list(self._given)] = False
+        near[:, list(self._given)] = shared[:, list(self._given)] = False
         self._loaded += touches[:, None] & loaded
         self._near += touches[:, None] & loaded & near
         mine = self._majority() & bears[:, None]
@@ -318,11 +314,11 @@ class LiveFeet:
             push = float(plate.wrench[0, 1])
             if push <= UNLOADED_N:
                 self._owners[:, p] = False
-                self._between[p] = self._press[p] = 0
+                self._between[p] = self._judged[p] = 0
             elif p in self._assigned:
                 self._owners[:, p] = near[:, p]
-            elif (mine | self._shared)[:, p].any():
-                self._owners[:, p] = (mine | self._shared)[:, p]
+            elif (mine | shared)[:, p].any():
+                self._owners[:, p] = (mine | shared)[:, p]
             elif not self._owners[:, p].any():  # a foot that sets down, before it stands
                 nearest = int(np.argmin(away[:, p]))
                 self._owners[nearest, p] = bool(near[nearest, p] and low[nearest])
@@ -330,22 +326,30 @@ class LiveFeet:
     def _press_between(
         self, plates: list[GroundPlate], cops: Array, outlines: Array, bears: Flags, away: Array
     ) -> Flags:
-        """(P,) plates that have pressed between two feet that may bear, under neither sole, for `SHORTEST_S`.
+        """(P,) plates that have pressed under neither sole of two feet that may bear, for `SHORTEST_S`; counts frames
+        of their presses, and those of them that lie between the markers of two flat feet (`Sharing`).
 
         Args:
-            away: (P,) m from the markers of the nearest foot, whose sole is no further away.
+            away: (F, P) m from the markers of each foot, whose sole is no further away.
         """
-        beside = beside_m(np.concatenate([plate.push for plate in plates]))
-        found = np.isfinite(away) & (away > beside)
+        push, nearest = np.concatenate([plate.push for plate in plates]), away.min(axis=0)
+        judged, beside = push > JUDGED_N, beside_m(push)
+        self._judged += judged
+        under_neither, between = np.isfinite(nearest) & (nearest > beside), judged & (nearest > BETWEEN_M)
         if len(bears) != 2 or not bears.all() or not self._marked.all():
-            found[:] = False
-        elif found.any():
+            under_neither[:] = between[:] = False
+        if under_neither.any():
             shapes = self._soles_among(outlines)
             soles = [shapes[f].reach(outlines[[f]][:, self._seen(f)]) for f in range(2)]
             corners = [np.repeat(sole, len(plates), axis=0) for sole in (*soles, np.concatenate(soles, axis=1))]
             *each, within = (distance_to_hull(cops, sole) for sole in corners)
-            found &= lies_between(each, within, beside)
-        self._beside = np.where(found, np.fmin(self._beside, self._time), np.inf)
+            under_neither &= lies_between(each, within, beside)
+        between &= self._flat.all()
+        if between.any():
+            both = np.broadcast_to(outlines.reshape(1, -1, 2), (len(plates), outlines.size // 2, 2))
+            between &= lies_between(away, distance_to_hull(cops, both), BETWEEN_M)
+        self._between += between
+        self._beside = np.where(under_neither, np.fmin(self._beside, self._time), np.inf)
         return np.asarray(self._time - self._beside >= SHORTEST_S)
 
 

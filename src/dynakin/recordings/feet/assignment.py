@@ -23,7 +23,7 @@ from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
 from dynakin.recordings.feet.findings import exchanged, plate_findings
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
 from dynakin.recordings.feet.loads import FootLoads, divided
-from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, partly_on
+from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import GroundPlate
@@ -168,14 +168,13 @@ class _Assignment:
                 if self.fixed.get(plate.name, self.feet[k]) != self.feet[k]:
                     continue
                 loaded = plate.loaded[inside]
-                enough = 0.5 * max(int(np.count_nonzero(loaded)), 1)
                 close = self.under[inside, k, p] | self.upon(plate, foot, inside)
                 if (self.sharing.between[inside, p] & partly_on(plate, foot)[inside]).any():
                     shares.append(p)
                 if self.sharing.beside[reach, p].any():
                     mine.append(p)
                     self.on[reach, k, p] |= self.sharing.beside[reach, p]
-                if np.count_nonzero(close & loaded) > enough:
+                if mostly(np.count_nonzero(close & loaded), np.count_nonzero(loaded)):
                     mine.append(p)
                     self.on[reach, k, p] |= plate.loaded[reach] & (self.under[reach, k, p] | foot.stands[reach])
                     self.on[inside, k, p] = True

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import ArrayLike
 
 from dynakin.arrays import runs
 from dynakin.recordings.feet.contact import FootContact
@@ -79,7 +80,7 @@ class Sharing:
             within = distance_to_hull(plate.cop, all_markers)
             between[:, p] = flat & judged & lies_between(from_markers, within, BETWEEN_M + off)
             for first, end in runs(plate.pressed):
-                most = 2 * np.count_nonzero(between[first:end, p]) > np.count_nonzero(judged[first:end])
+                most = mostly(np.count_nonzero(between[first:end, p]), np.count_nonzero(judged[first:end]))
                 beside[first:end, p] |= most & between[first:end, p]
             beside[:, p] &= partly_on(plate, feet[0]) & partly_on(plate, feet[1])
         return cls(beside, between)
@@ -92,12 +93,18 @@ def partly_on(plate: GroundPlate, foot: FootContact) -> Flags:
     return np.asarray((plate.beyond(foot.outline) < BEYOND_M).any(axis=1))
 
 
+def mostly(frames: ArrayLike, of: ArrayLike) -> Flags:
+    """Whether so many frames are most of so many: a stance's with its plate under the foot, of those with a load; a
+    press's between two feet, of those that are judged."""
+    return np.asarray(2 * np.asarray(frames) > np.asarray(of))
+
+
 def beside_m(push: Array) -> Array:
     """How far (m) from both soles a load (N) lies that neither foot bears alone; inf where it is too light to say."""
     return np.where(push > JUDGED_N, BESIDE_M + PRESSURE_NM / np.maximum(push, JUDGED_N), np.inf)
 
 
-def lies_between(away: Sequence[Array], from_both: Array, limit_m: Array | float) -> Flags:
+def lies_between(away: Sequence[Array] | Array, from_both: Array, limit_m: Array | float) -> Flags:
     """Whether centres of pressure lie further than that from both of two outlines, but not so far from the area that
     they span: by their distances from each, and from that."""
     with np.errstate(invalid="ignore"):

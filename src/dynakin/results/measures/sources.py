@@ -74,8 +74,13 @@ def out_of_sight(seen: npt.NDArray[np.bool_], owners: Sequence[str], time: npt.N
         own = np.asarray(~seen[:, [name == segment for name in owners]].any(axis=1))
         found[segment] = np.zeros(len(time), dtype=bool)
         for first, end in runs(own):
-            found[segment][first:end] = time[end - 1] - time[first] > UNSEEN_S + 1e-9 and not own.all()
+            found[segment][first:end] = too_long(time[end - 1] - time[first]) and not own.all()
     return found
+
+
+def too_long(unseen_s: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    """Whether nobody knows any more where something is that was lost so long ago (s)."""
+    return np.asarray(np.asarray(unseen_s) > UNSEEN_S + 1e-9)
 
 
 def in_use(seen: npt.NDArray[np.bool_], time: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
