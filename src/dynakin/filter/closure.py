@@ -15,7 +15,7 @@ import numpy.typing as npt
 from dynakin.arrays import rms_length, runs, widened
 from dynakin.filter.mass_centre import mass_centre
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.recording import rate_of
+from dynakin.recordings.times import rate_of
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]

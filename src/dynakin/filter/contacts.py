@@ -12,6 +12,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.samples import in_step
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
+from dynakin.recordings.times import step_of
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
@@ -156,7 +157,7 @@ class ContactLoads:
         if delay_s == 0.0:
             return self
         wrench = np.stack([in_step(time, self.wrench[:, k], delay_s) for k in range(len(self.names))], axis=1)
-        nearest = np.clip(np.searchsorted(time, time + delay_s - 0.5 * np.median(np.diff(time))), 0, len(time) - 1)
+        nearest = np.clip(np.searchsorted(time, time + delay_s - 0.5 * step_of(time)), 0, len(time) - 1)
         contact = self.contact[nearest]
         same = (contact == self.contact) & (contact != UNMEASURED)  # else plates and priors would be mixed
         wrench = np.where(same[..., None], wrench, self.wrench[nearest])

@@ -11,6 +11,7 @@ from dynakin.arrays import runs, widened
 from dynakin.filter.contacts import ContactLoads
 from dynakin.messages import Message, warning
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE
+from dynakin.recordings.times import step_of
 from dynakin.results.naming import listed
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +39,7 @@ def impossible(feet: ContactLoads, wrench: Array, time: Array, weight: float, so
     """
     grounded = _grounded(feet, soles)
     derived = _derived(feet, soles)
-    step = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
+    step = step_of(time) if len(time) > 1 else np.inf
     flies = widened((feet.contact[:, grounded] == NO_CONTACT).all(axis=1), int(ALOFT_S / step))
     size = np.linalg.norm(wrench[..., :3], axis=2) / weight
     beyond = (size > np.where(flies, LANDING, PUSH)[:, None]) | (wrench[..., 1] < -PULL * weight)

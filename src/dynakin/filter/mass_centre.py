@@ -13,8 +13,8 @@ from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
 from dynakin.model.spec import free_names
-from dynakin.recordings.recording import rate_of
 from dynakin.recordings.resampling import low_pass
+from dynakin.recordings.times import rate_of
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]

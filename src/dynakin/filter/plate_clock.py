@@ -23,8 +23,8 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.inverse_kinematics import FEWEST_MARKERS, inverse_kinematics
 from dynakin.model.calibration.pose_start import bare
 from dynakin.model.inertia import INERTIA_NAMES
-from dynakin.recordings.recording import rate_of
 from dynakin.recordings.resampling import low_pass
+from dynakin.recordings.times import rate_of
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]

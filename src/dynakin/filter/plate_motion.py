@@ -18,7 +18,8 @@ from dynakin.filter.mass_centre import mass_centre
 from dynakin.filter.samples import in_step
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.plates.axes import TURNS, PlateAxes, turned_feet
-from dynakin.recordings.recording import Plate, Recording, rate_of
+from dynakin.recordings.recording import Plate, Recording
+from dynakin.recordings.times import rate_of
 from dynakin.results.naming import listed
 from dynakin.units import GRAVITY_M_S2
 

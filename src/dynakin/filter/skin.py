@@ -20,6 +20,7 @@ from dynakin.filter.systematic import drives, followed
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
+from dynakin.recordings.times import step_of
 from dynakin.results.records import FOLLOWING
 from dynakin.settings.noise import Noise
 
@@ -84,7 +85,7 @@ def following_skin(tracker: Tracker, arrays: dict[str, Array], time: Array) -> F
     followed_by = followed(arrays["state"][:, : len(free)], calibrated)
     followed_by = np.nan_to_num(followed_by - followed_by[used].mean(axis=0))
     # the filter's displacements: independent every two time constants
-    step_s = float(np.median(np.diff(time)))
+    step_s = step_of(time)
     independent = 2.0 * soft_tissue_time_s(noise, calibrated) / step_s
     ridge = independent * (noise.soft_tissue_sd_fraction / noise.following_skin_fraction) ** 2
     local = np.zeros((len(time), *columns.shape))

@@ -20,6 +20,7 @@ from dynakin.arrays import rms, wrench_about
 from dynakin.errors import RecordingError
 from dynakin.identification.trials import SHORTEST_S, Common, MeasuredTrial
 from dynakin.identification.unknowns import Unknowns
+from dynakin.recordings.times import step_of
 
 Array = npt.NDArray[np.float64]
 
@@ -79,7 +80,7 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
     """
     rows, own_count = common.rows, len(unknowns.nuisance_sd)
     chosen = [_known(trial, rows) for trial in trials]
-    step = [float(np.median(np.diff(trial.movement.time))) for trial in trials]
+    step = [step_of(trial.movement.time) for trial in trials]
     if not any(known_s(trial) >= SHORTEST_S for trial in trials):
         raise RecordingError("identification: no trial has a second of frames with the plates' wrench, expected one")
     sigma = np.tile(FIRST_SIGMA[rows], (len(trials), 1))
@@ -126,7 +127,7 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
 def known_s(trial: MeasuredTrial) -> float:
     """Seconds of frames with the plates' wrench."""
     known = np.isfinite(trial.wrench).all(axis=1).sum()
-    return float(known * np.median(np.diff(trial.movement.time))) if len(trial.wrench) > 1 else 0.0
+    return float(known * step_of(trial.movement.time)) if len(trial.wrench) > 1 else 0.0
 
 
 def _known(trial: MeasuredTrial, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:

@@ -20,6 +20,7 @@ from dynakin.recordings.companions import another_person
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
+from dynakin.recordings.times import step_of
 from dynakin.results.measures.tracking import why_lost
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.units import GRAVITY_M_S2
@@ -175,7 +176,7 @@ class Common:
         judged = as_estimate(self.estimator, tracker, arrays, recording, markers)
         if (reason := why_lost(judged)) is not None:
             raise LostError(f"{recording.path or recording.name}: {reason}")
-        every = max(1, round(1.0 / (RATE_HZ * float(np.median(np.diff(recording.time))))))
+        every = max(1, round(1.0 / (RATE_HZ * step_of(recording.time))))
         states, unfiltered = (np.tile(self.initial.x0, (recording.n_frames, 1)) for _ in range(2))
         columns = [self.columns(block) for block in ("coordinates", "speeds", "accelerations")]
         quiet = smooth(recording.time, arrays["state"][:, columns[0]], CUTOFF_HZ)

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
+from dynakin.recordings.times import step_of
 
 Array = npt.NDArray[np.float64]
 
@@ -31,7 +32,7 @@ def rate_problem(time: Array) -> str | None:
     """What is wrong with the rate of increasing times (T,) s, None where nothing is."""
     if len(time) < 2:
         return None
-    step = float(np.median(np.diff(time)))
+    step = step_of(time)
     if SLOWEST_HZ * step <= 1.0 <= FASTEST_HZ * step:
         return None
     units = {"milliseconds": 1e-3, "microseconds": 1e-6}

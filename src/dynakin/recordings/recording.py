@@ -18,10 +18,10 @@ from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
 from dynakin.recordings.limits import check_markers, check_place, check_wrench, numbers
 from dynakin.recordings.signals import AnalogChannel, Event
+from dynakin.recordings.times import rate_of
 
 Array = npt.NDArray[np.float64]
 
-_FEW = 9  # frames, over which the scatter of time stamps is averaged
 _PERSON = 0.25  # of the markers that are usually seen: fewer are what a person leaves behind, or reflections
 
 
@@ -68,38 +68,6 @@ def _tuple_of(given: Any, kind: type, where: str, what: str) -> tuple[Any, ...]:
     if wrong := [each for each in found if not isinstance(each, kind)]:
         raise RecordingError(f"{where} holds {wrong[0]!r}, expected {what} only")
     return found
-
-
-def rate_of(time: Array) -> float:
-    """Rate of times (T,) s in Hz: the mean one where they lie about an even grid, by which stamps scatter and files
-    round; that of the median step where frames are missing; NaN of fewer than two."""
-    if len(time) < 2:
-        return float("nan")
-    step = float(np.median(np.diff(time)))
-    even = np.linspace(time[0], time[-1], len(time))
-    if np.abs(time - even).max() < 0.1 * step:
-        return float((len(time) - 1) / (time[-1] - time[0]))
-    mean_step, off = even_step(time)
-    return 1.0 / mean_step if scatters(off, mean_step) else 1.0 / step
-
-
-def even_step(time: Array) -> tuple[float, Array]:
-    """Step of the even grid that lies nearest to times (T,) s, by least squares, and how far these lie off it (T,)."""
-    k = centred(len(time))
-    step = float(k @ time / (k @ k))
-    return step, time - time.mean() - step * k
-
-
-def centred(count: int) -> Array:
-    """Numbers of so many frames, from the middle one."""
-    return np.asarray(np.arange(count) - 0.5 * (count - 1), dtype=float)
-
-
-def scatters(off: Array, step: float) -> bool:
-    """Whether times that lie off an even grid by (T,) s do so at random: each less than half a step, and on average
-    over a few frames much less, as they do not where a frame is missing."""
-    mean = np.convolve(off, np.full(_FEW, 1.0 / _FEW), mode="valid") if len(off) >= _FEW else off
-    return bool(np.abs(off).max() < 0.5 * step and np.abs(mean).max() < 0.3 * step)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

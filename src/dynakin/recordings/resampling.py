@@ -11,6 +11,7 @@ from scipy.linalg import blas
 
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.recording import Array
+from dynakin.recordings.times import rate_of, step_of
 
 UNEVEN = 0.1
 """Part of a step by which a sample's time may be off an even rate: files round their times, and a lost sample moves
@@ -131,13 +132,14 @@ def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = 
     """
     if same_times(time_in, time_out):
         return samples
-    rate_in, rate_out = _mean_rate(time_in), _rate(time_out)
+    rate_in, rate_out = rate_of(time_in), rate_of(time_out)
     step = 1 / rate_in
     even = time_in[0] + (time_in[-1] - time_in[0]) * np.linspace(0.0, 1.0, len(time_in))
     if np.abs(time_in - even).max() > UNEVEN * step:
         raise RecordingError("the forces are sampled unevenly, expected a constant rate to resample from")
     # The last marker frame may lie up to one marker step after the last analog sample of the frame before.
-    if time_out[0] < time_in[0] - 0.5 * step or time_out[-1] > time_in[-1] + max(step, 0.5 / rate_out):
+    before, after = time_in[0] - 0.5 * step, time_in[-1] + max(step, 0.5 / rate_out)
+    if len(time_in) < 2 or time_out[0] < before or time_out[-1] > after:
         raise RecordingError(
             f"forces from {time_in[0]:g} s to {time_in[-1]:g} s do not cover {time_out[0]:g} s to {time_out[-1]:g} s"
         )
@@ -169,7 +171,7 @@ def latest_before(time_in: Array, time_out: Array, step_s: float) -> npt.NDArray
 
 def same_times(a: Array, b: Array) -> bool:
     """Whether two time columns are the same within 1 % of a step."""
-    return len(a) == len(b) and (len(a) < 2 or bool(np.abs(a - b).max() < 0.01 * np.median(np.diff(b))))
+    return len(a) == len(b) and (len(a) < 2 or bool(np.abs(a - b).max() < 0.01 * step_of(b)))
 
 
 def _antialias(samples: Array, rate_in: float, rate_out: float) -> Array:
@@ -182,15 +184,6 @@ def _antialias(samples: Array, rate_in: float, rate_out: float) -> Array:
     padded = np.pad(samples, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
     padded = np.pad(padded, ((half - reach, half - reach), (0, 0)), mode="edge")
     return np.asarray(scipy.signal.oaconvolve(padded, kernel[:, None], mode="valid", axes=0))
-
-
-def _rate(time: Array) -> float:
-    return float(1 / np.median(np.diff(time))) if len(time) > 1 else float("inf")
-
-
-def _mean_rate(time: Array) -> float:
-    """Of rounded times: their steps are all wrong, the whole is not."""
-    return (len(time) - 1) / float(time[-1] - time[0]) if len(time) > 1 else float("inf")
 
 
 def _check_cutoff(rate_hz: float, cutoff_hz: float) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.recordings.times import step_of
 from dynakin.units import COMPONENTS
 from dynakin.validation.table2 import MARKERS, spread
 
@@ -70,7 +71,7 @@ def line(time: Array, signal: Array, last: int, slope_s: float = SLOPE_S) -> Arr
 
 def span_frames(time: Array, seconds: float) -> int:
     """Frames in a span, at least one."""
-    return max(1, round(seconds / float(np.median(np.diff(time)))))
+    return max(1, round(seconds / step_of(time)))
 
 
 def _known(signal: Array, last: int) -> tuple[int, Array]:

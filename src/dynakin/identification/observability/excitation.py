@@ -20,6 +20,7 @@ from dynakin.bindings import _core
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.known_motion import Known, KnownMotion
 from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.recordings.times import step_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import words
 from dynakin.simulation.jets import Jet, sinusoids, step
@@ -111,8 +112,8 @@ class Bench:
 
     @cached_property
     def _known(self) -> KnownMotion:
-        steps = np.diff(self.trial.time)
-        return KnownMotion(self._tracker, self.measured, float(np.median(steps)) if len(steps) else 1.0)
+        step_s = step_of(self.trial.time) if len(self.trial.time) > 1 else 1.0
+        return KnownMotion(self._tracker, self.measured, step_s)
 
     def deviations(self, *motions: Motion) -> Array:
         """Standard deviations (n,) after these motions, one after the other, measured as the trial was; NaN: skin and

@@ -19,6 +19,7 @@ from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Array
+from dynakin.recordings.times import step_of
 
 Flags = npt.NDArray[np.bool_]
 
@@ -163,7 +164,7 @@ def _drift(time: Array, plate: GroundPlate, soles: Soles, owners: Flags) -> Mess
         axis=1,
     )
     clear = (np.nan_to_num(away, nan=0.0) > CLEAR_M).all(axis=1) & plate.known
-    if len(time) < 2 or np.count_nonzero(clear) * float(np.median(np.diff(time))) < CLEAR_S:
+    if len(time) < 2 or np.count_nonzero(clear) * step_of(time) < CLEAR_S:
         return None
     read = plate.wrench[clear, 1]
     low, middle, high = np.percentile(read, (5.0, 50.0, 95.0))

@@ -14,8 +14,9 @@ from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
-from dynakin.recordings.recording import Array, Plate, Recording, rate_of
+from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.resampling import ReadOptions, low_pass, resample, same_times
+from dynakin.recordings.times import rate_of, step_of
 
 _MIN_RATE_RATIO = 0.99
 
@@ -135,7 +136,7 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
 
 def _check_cover(recording: Recording, table: Table) -> None:
     t, m = table.time, recording.time
-    step = float(np.median(np.diff(m))) if len(m) > 1 else 0.0
+    step = step_of(m) if len(m) > 1 else 0.0
     rate = rate_of(t) if len(t) > 1 else 0.0
     slow = len(m) > 1 and rate < _MIN_RATE_RATIO * recording.rate
     if slow or t[0] > m[0] + 0.5 * step or t[-1] < m[-1] - 0.5 * step:

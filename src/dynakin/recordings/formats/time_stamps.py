@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import by_neighbours
 from dynakin.messages import Message, note
-from dynakin.recordings.recording import centred, even_step, scatters
+from dynakin.recordings.times import centred, even_grid, scatters
 
 Array = npt.NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def _grid(time: Array, rate_in_header: float | None) -> Array | None:
     near as can be told."""
     if len(time) < _ENOUGH or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         return None
-    slope, left = even_step(time)
+    slope, left = even_grid(time)
     k = centred(len(time))
     error = float(np.sqrt(np.mean(np.square(left)) / (k @ k)))
     for rate in (rate_in_header, float(np.rint(1.0 / slope))):

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from dynakin.arrays import by_neighbours, runs
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
-from dynakin.recordings.recording import Array, rate_of
+from dynakin.recordings.recording import Array
+from dynakin.recordings.times import rate_of, step_of
 from dynakin.units import length_factor
 
 _METRES_BELOW, _CENTIMETRES_BELOW = 5.0, 300.0
@@ -263,7 +264,7 @@ def _left_out(markers: Array, time: Array) -> list[Message]:
     if len(time) < 6:
         return []
     dt = np.diff(time)
-    usual = float(np.median(dt))
+    usual = step_of(time)
     even = np.lib.stride_tricks.sliding_window_view(np.abs(dt - usual) < _EVEN * usual, 5).all(axis=1)
     step = np.diff(markers, axis=0) / usual
     expected, found = by_neighbours(step), step[2:-2]
@@ -326,8 +327,7 @@ def timing_notes(time: Array, rate_in_header: float | None = None) -> list[Messa
         return []
     notes: list[Message] = []
     step = np.diff(time)
-    median = float(np.median(step))
-    rate = rate_of(time)
+    median, rate = step_of(time), rate_of(time)
     if rate_in_header and abs(rate_in_header / rate - 1) > 0.01:
         notes.append(
             note(

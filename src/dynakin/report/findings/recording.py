@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynakin.arrays import runs
+from dynakin.recordings.times import step_of
 from dynakin.report.findings.finding import Insight, Level, Metrics
 from dynakin.report.labels import short_marker_names
 from dynakin.results.estimate import Estimate
@@ -64,6 +65,6 @@ def _briefly(estimate: Estimate) -> bool:
     """Whether no sensor was refused for `BRIEF_S` or more, all its stretches together."""
     if "verdict" not in estimate.data:
         return False
-    frame_s = float(np.median(np.diff(estimate.time)))
+    frame_s = step_of(estimate.time)
     refused = (estimate.values("verdict") == REFUSED).sum(axis=0)
     return bool(refused.max() * frame_s < BRIEF_S)

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dynakin.arrays import rms, rms_length
+from dynakin.recordings.times import step_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.records import Parameter
 from dynakin.units import COMPONENTS
@@ -62,7 +63,7 @@ def misfit_settling(time: np.ndarray, misfit: np.ndarray) -> Settling:
     """
     half = len(time) // 2
     early, level = (float(rms(part[np.isfinite(part)])) for part in (misfit[:half], misfit[half:]))
-    running = running_rms(misfit, max(1, round(RUNNING_S / float(np.median(np.diff(time))))))
+    running = running_rms(misfit, max(1, round(RUNNING_S / step_of(time))))
     growth = level / early if early > 0.0 else 1.0
     if not np.isfinite(level) or growth > FACTOR:
         return Settling(None, growth)

@@ -20,6 +20,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from dynakin.arrays import rms
+from dynakin.recordings.times import step_of
 from dynakin.results.naming import listed
 
 Judgement = Literal["overconfident", "consistent", "conservative"]
@@ -145,7 +146,7 @@ def statistics_of(
     in `consistency`.
     """
     found = {}
-    frames = max(2, round(AVERAGED_S / float(np.median(np.diff(time))))) if len(time) > 2 else len(time) + 1
+    frames = max(2, round(AVERAGED_S / step_of(time))) if len(time) > 2 else len(time) + 1
     for name, (innovations, sd) in {"markers": markers, "wrench": wrench}.items():
         if sd is None:
             continue

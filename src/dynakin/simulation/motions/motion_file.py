@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from dynakin.errors import ConfigError
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.resampling import low_pass
+from dynakin.recordings.times import step_of
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.mechanics import Motion
@@ -73,7 +74,7 @@ def _even_rate(path: Path, time: Array) -> float:
     if len(time) < _FEWEST_ROWS:
         raise ConfigError(f"{path}: {len(time)} rows, expected at least {_FEWEST_ROWS} to make a motion of")
     steps = np.diff(time)
-    middle = float(np.median(steps))
+    middle = step_of(time)
     if np.abs(steps - middle).max() > 0.01 * middle:
         row = int(np.argmax(np.abs(steps - middle)))
         raise ConfigError(

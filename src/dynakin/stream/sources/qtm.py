@@ -11,6 +11,7 @@ import numpy as np
 import qtm_rt
 
 from dynakin.errors import ConfigError, StreamError
+from dynakin.recordings.times import step_of
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo, Streams
 from dynakin.stream.sources.qtm_parameters import FRAMES, QtmParameters, parse_parameters
 
@@ -122,7 +123,7 @@ class QtmSource:
                 f"{self._where}: QTM answers, but no frames come within {timeout_s:g} s; start a measurement or play "
                 "a file with real-time output"
             )
-        rate = 1.0 / float(np.median(np.diff(stamps)))
+        rate = 1.0 / step_of(stamps)
         notes = [f"{self._where}: {len(parameters.labels)} labels, up is {parameters.up or 'not given'}."]
         markers = StreamInfo(parameters.labels, rate, "qtm", ordered=True)
         if not parameters.plates:

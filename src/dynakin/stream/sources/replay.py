@@ -11,6 +11,7 @@ from dynakin.errors import ConfigError
 from dynakin.recordings.formats.ground_forces import plates_from_table
 from dynakin.recordings.read import read, read_forces
 from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.times import step_of
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo, Streams
 
 _SEAM_S = 1.0  # nobody is seen between the last frame and the first: a gap, as it would be where somebody comes back
@@ -59,7 +60,7 @@ class Replay:
         clock, recording = "replay", self.recording
         plates = None
         if self._plate_names:
-            rate = 1.0 / float(np.median(np.diff(self._plate_time)))
+            rate = 1.0 / step_of(self._plate_time)
             plates = StreamInfo(self._plate_names, rate, clock, ordered=True)
         return Streams(
             StreamInfo(recording.marker_names, recording.rate, clock, ordered=True),

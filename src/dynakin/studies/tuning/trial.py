@@ -12,6 +12,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.samples import in_step
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
+from dynakin.recordings.times import step_of
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.records import FOLLOWING, REFUSED
 from dynakin.settings.model import QUANTITIES, Quantity
@@ -106,7 +107,7 @@ def prepare(
         markers[refused[:, :-1]] = np.nan
         wrench[refused[:, -1]] = np.nan
     window = np.flatnonzero(evaluation_window(recording.time))
-    step = float(np.median(np.diff(recording.time)))
+    step = step_of(recording.time)
     return TuningTrial(
         recording.name,
         initial,
