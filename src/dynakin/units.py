@@ -1,5 +1,5 @@
 """Conversion factors to SI at the edges of dynakin: files and reports; inside, everything is SI and
-radians. How large persons are, by which a wrong unit shows."""
+radians. How large persons and bodies are, by which a wrong unit shows."""
 
 from __future__ import annotations
 
@@ -18,6 +18,28 @@ def gravity_problem(gravity: Sequence[float]) -> str:
     if low <= -y <= high and abs(x) + abs(z) <= 1e-9:
         return ""
     return f"found {x:g} {y:g} {z:g}, expected 0 -{GRAVITY_M_S2} 0 (along -Y, {low:g} to {high:g} m/s^2)"
+
+
+_LIGHT_KG_M2 = 0.05  # a foot has less: what is light moves no moment by much
+_ROUNDED = 0.01  # of the largest principal moment: entries are written with few digits
+_UNEVEN = 1.25  # times the sum of the other two, by two digits of what is not light; a disc has 1
+_WIDEST_M = 2.0  # radius of gyration; a bar of 2.2 m with all of its weight at the ends has 1.1, a trunk 0.3
+
+
+def inertia_problem(mass_kg: float, principal: Sequence[float]) -> str:
+    """What is wrong with principal moments of inertia (3,) kg m^2 about a body's centre of mass, what was found and
+    expected; empty where there is a body that has them, or what is wrong is too small to matter."""
+    low, middle, high = sorted(map(float, principal))
+    if low < -_ROUNDED * high:
+        expected = "none below 0"
+    elif high > _UNEVEN * (low + middle) and high > _LIGHT_KG_M2:
+        expected = f"the largest at most the sum of the others ({low + middle:.3g})"
+    elif high > mass_kg * _WIDEST_M**2 and high > _LIGHT_KG_M2:
+        size = (high / mass_kg) ** 0.5
+        expected = f"at most {mass_kg * _WIDEST_M**2:.3g} of {mass_kg:g} kg, whose radius of gyration is {size:.3g} m"
+    else:
+        return ""
+    return f"found principal moments of inertia {low:.4g}, {middle:.4g} and {high:.4g} kg m^2, expected {expected}"
 
 
 PERSON_MASS_KG = (5.0, 400.0)

@@ -107,8 +107,8 @@ def test_loads_that_do_not_fit_are_told(initial: CalibratedModel, definition: Mo
         ({"loads": [bar | {"mass": 3.0}], "mass_kg": 70.0}, "unknown key 'mass'"),
         ({"loads": [bar | {"mass_kg": -1.0}], "mass_kg": 70.0}, "mass_kg"),
         ({"loads": [bar | {"place_m": [50, 300, 0.0]}], "mass_kg": 70.0}, r"place_m: .*304 m .*expected metres, 2 at"),
-        ({"loads": [bar | {"inertia_kg_m2": [1, 1, 5]}], "mass_kg": 70.0}, "found 1, 1, 5, expected .* at most 2:"),
-        ({"loads": [bar | {"inertia_kg_m2": [900, 900, 900]}], "mass_kg": 70.0}, "expected .* at most 80:"),
+        ({"loads": [bar | {"inertia_kg_m2": [1, 1, 5]}], "mass_kg": 70.0}, "1, 1 and 5 .* others [(]2[)]"),
+        ({"loads": [bar | {"inertia_kg_m2": [900, 900, 900]}], "mass_kg": 70.0}, "at most 80 of 20 kg"),
         ({"plate_loads": [{"plate": "plate 1", "force": [0, 1, 0]}]}, "plate_loads"),
         ({"zero": "sitting"}, "zero"),
     ):

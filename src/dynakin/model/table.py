@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.files import LARGEST_TEXT, is_file, read_bytes
+from dynakin.model.inertia import RigidBody
 from dynakin.settings.strict import nearest
 from dynakin.settings.subject import Sex
 
@@ -148,7 +149,7 @@ def _part(row: dict[str, str], where: str) -> Part:
     if numbers["mass_percent"] <= 0.0:
         raise ModelError(f"{where}: mass_percent is {row['mass_percent']}, expected more than 0")
     tensor = _tensor([numbers[key] for key in _RADII])
-    if np.linalg.eigvalsh(0.5 * np.trace(tensor) * np.eye(3) - tensor)[0] <= 0.0:
+    if not RigidBody(1.0, np.zeros(3), tensor).possible():
         raise ModelError(
             f"{where}: the radii of gyration belong to no real body (expected a tensor whose principal "
             "moments obey the triangle inequality; off-diagonal radii are entries of the tensor, not "

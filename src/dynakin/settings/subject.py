@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from dynakin.errors import ModelError
 from dynakin.settings.strict import Name, Strict, validate
-from dynakin.units import PERSON_HEIGHT_M, PERSON_MASS_KG
+from dynakin.units import PERSON_HEIGHT_M, PERSON_MASS_KG, inertia_problem
 
 Sex = Literal["male", "female"]
 
@@ -57,10 +57,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 
 
 FARTHEST_M = 2.0
-"""From a segment's joint to a load's centre, and of a load's radius of gyration: a bar of 2.2 m with all of its weight
-at the ends has 1.1 m."""
-_EVEN = 1.01
-"""The largest moment of inertia over the sum of the others: 1 of a disc, and digits."""
+"""From a segment's joint to a load's centre."""
 
 
 class CarriedLoad(Strict):
@@ -88,13 +85,8 @@ class CarriedLoad(Strict):
 
     @model_validator(mode="after")
     def _possible(self) -> CarriedLoad:
-        *others, largest = sorted(self.inertia_kg_m2)
-        if largest > _EVEN * sum(others) or largest > self.mass_kg * FARTHEST_M**2:
-            most = min(sum(others), self.mass_kg * FARTHEST_M**2)
-            raise ValueError(
-                f"inertia_kg_m2: found {', '.join(f'{v:g}' for v in self.inertia_kg_m2)}, expected the largest to be "
-                f"at most {most:g}: the sum of the others, and {FARTHEST_M**2:g} m^2 times its mass"
-            )
+        if problem := inertia_problem(self.mass_kg, self.inertia_kg_m2):
+            raise ValueError(f"inertia_kg_m2: {problem}")
         return self
 
 

@@ -14,15 +14,11 @@ from dynakin.model.opensim.functions import function_of, joined, polynomial, rea
 from dynakin.model.opensim.joints import read_axes, read_coordinate
 from dynakin.model.opensim.xml_file import Node, read_xml
 from dynakin.settings.strict import nearest
-from dynakin.units import GRAVITY_M_S2
+from dynakin.units import GRAVITY_M_S2, inertia_problem
 
 _OLDEST = 20000  # before that, OpenSim 1's files are built otherwise
 _MOST = 1000  # bodies or joints: whole bodies with fingers and vertebrae have a fifth
 _ENTRIES = ("inertia_xx", "inertia_yy", "inertia_zz", "inertia_xy", "inertia_xz", "inertia_yz")
-_ROUNDED = 0.01  # of the largest principal moment: entries are written with few digits
-_UNEVEN = 2.0  # times the sum of the other two: toes of Rajagopal's model have 3.3, of 0.001 kg m^2
-_LIGHT_KG_M2 = 0.05  # a foot has less: what is light moves no moment by much
-_WIDEST_M = 1.0  # radius of gyration of a part of a person; a trunk with head and arms has 0.3
 _NOT_MECHANICS = {
     "ForceSet": "muscles and other forces",
     "ControllerSet": "controllers",
@@ -183,33 +179,13 @@ def _body(node: Node) -> Body:
         entries = node.numbers("inertia", 6)
     else:
         entries = [node.number(name, 0.0) for name in _ENTRIES]
-    if mass > 0.0:
-        _refuse_impossible(node, mass, entries)
-    else:
+    if mass == 0.0:
         return Body(node.name, 0.0, (0.0, 0.0, 0.0), (0.0,) * 6)
-    return Body(node.name, mass, (x, y, z), tuple(entries))
-
-
-def _refuse_impossible(node: Node, mass: float, entries: list[float]) -> None:
-    """
-    Raises:
-        ModelError: principal moments of inertia that no body of this mass has, where they are large enough to matter.
-    """
     xx, yy, zz, xy, xz, yz = entries
-    low, middle, high = (float(v) for v in np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    size = float(np.sqrt(max(high, 0.0) / mass))
-    if min(xx, yy, zz) < 0.0 or low < -_ROUNDED * high:
-        expected = "none below 0"
-    elif high > _UNEVEN * (low + middle) and high > _LIGHT_KG_M2:
-        expected = f"the largest at most the sum of the others ({low + middle:.3g})"
-    elif size > _WIDEST_M and high > _LIGHT_KG_M2:
-        expected = f"at most {mass * _WIDEST_M**2:.3g} of {mass:g} kg, whose radius of gyration is {size:.3g} m"
-    else:
-        return
-    node.fail(
-        f"found principal moments of inertia {low:.4g}, {middle:.4g} and {high:.4g} kg m^2 about the centre of mass, "
-        f"expected {expected}. Correct its inertia (kg m^2, not kg mm^2)"
-    )
+    principal = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).tolist()
+    if problem := inertia_problem(mass, principal):
+        node.fail(f"{problem}. Correct its inertia (about its centre of mass; kg m^2, not kg mm^2)")
+    return Body(node.name, mass, (x, y, z), tuple(entries))
 
 
 def _couplers(model: Node, coordinates: set[str]) -> tuple[tuple[Coupler, ...], list[str]]:
