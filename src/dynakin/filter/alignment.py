@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from dynakin.filter.closure import plates_misfit
 from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.plate_clock import Delay
 from dynakin.filter.plate_motion import clock_in_words
 from dynakin.filter.samples import in_step
 from dynakin.filter.tracker import Tracker
@@ -61,39 +62,34 @@ def run_in_step(
     misfit = None
     for done in range(passes):
         delay = delay_of(calibrated, arrays["state"][-1], arrays["state_sd"][-1])
-        if delay is None or not is_late(delay):
+        if delay is None or not delay.beyond(LEAST_S, SIGMAS):
             break
         if not done:  # of nearly every run nobody asks
             misfit = plates_misfit(calibrated, time, markers, wrench)
-        taken = in_step(time, wrench, shift + delay[0])
+        taken = in_step(time, wrench, shift + delay.delay_s)
         fits = plates_misfit(calibrated, time, markers, taken)
         if misfit is not None and fits is not None and fits > misfit:
-            return InStep(tracker, arrays, shift, [contradicted(shift + delay[0], misfit, fits)])
-        shift, misfit = shift + delay[0], fits
+            return InStep(tracker, arrays, shift, [contradicted(shift + delay.delay_s, misfit, fits)])
+        shift, misfit = shift + delay.delay_s, fits
         tracker = tracker.fresh()
         arrays = run(tracker, time, markers, taken, progress, feet and feet.in_step(time, shift))
     delay = delay_of(calibrated, arrays["state"][-1], arrays["state_sd"][-1])
     return InStep(tracker, arrays, shift, in_words(shift, delay))
 
 
-def delay_of(initial: CalibratedModel, state: Array, sd: Array) -> tuple[float, float] | None:
-    """Delay and its standard deviation, s, after the last frame (state, sd: (n,)); None where none is estimated."""
+def delay_of(initial: CalibratedModel, state: Array, sd: Array) -> Delay | None:
+    """The plates' delay after the last frame (state, sd: (n,)); None where none is estimated."""
     if "plates/delay" not in initial.names:
         return None
     k = initial.names.index("plates/delay")
-    return float(state[k]), float(sd[k])
+    return Delay(float(state[k]), float(sd[k]))
 
 
-def is_late(delay: tuple[float, float] | None) -> bool:
-    """Whether a delay is worth bringing the plates into step for."""
-    return delay is not None and abs(delay[0]) > max(LEAST_S, SIGMAS * delay[1])
-
-
-def in_words(shift_s: float, delay: tuple[float, float] | None) -> list[Message]:
+def in_words(shift_s: float, delay: Delay | None) -> list[Message]:
     """What was found about the plates' clock; empty where nothing was asked."""
     if delay is None:
         return []
-    text = sentence(clock_in_words(shift_s + delay[0], delay[1]))
+    text = sentence(clock_in_words(shift_s + delay.delay_s, delay.sd_s))
     if shift_s:
         return [note("in step", f"{text}; they were brought into step.")]
     return [note("sum of the plates", f"{text}.")]

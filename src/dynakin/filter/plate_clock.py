@@ -64,7 +64,11 @@ class Delay(NamedTuple):
     @property
     def worth_it(self) -> bool:
         """Whether it is worth bringing the plates into step."""
-        return abs(self.delay_s) > max(LEAST_S, LEAST_SD * self.sd_s)
+        return self.beyond(LEAST_S, LEAST_SD)
+
+    def beyond(self, least_s: float, sigmas: float) -> bool:
+        """Whether it is longer than so much, and than so many of its standard deviations."""
+        return abs(self.delay_s) > max(least_s, sigmas * self.sd_s)
 
 
 def clock_delay(initial: CalibratedModel, time: Array, markers: Array, wrench: Array) -> Delay | None:
