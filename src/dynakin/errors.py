@@ -18,17 +18,20 @@ class DynakinError(Exception):
 
     Names out of damaged files can hold anything: what cannot be printed in a line is written as Python writes it, and
     the middle of what is too long is left out.
+
+    Attributes:
+        asks_for: key of the setting that the line asks for ("static"), where it is one that another place may have.
     """
 
     exit_code = 2
     """With which the command line ends."""
 
-    def __init__(self, message: str) -> None:
+    def __init__(self, message: str, *, asks_for: str = "") -> None:
         message = _UNPRINTABLE.sub(lambda found: ascii(found[0])[1:-1], message)
         if len(message) > _LONGEST:
             message = f"{message[: _LONGEST // 2]} ... {message[-_LONGEST // 2 :]}"
         super().__init__(message)
-        self.message = message
+        self.message, self.asks_for = message, asks_for
 
 
 class RecordingError(DynakinError):

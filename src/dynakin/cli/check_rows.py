@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from dynakin.cli.prepared import Rows, assumed, contacts, in_a_row, short
-from dynakin.errors import DynakinError, ModelError
+from dynakin.errors import DynakinError
 from dynakin.filter.prepared import Prepared
 from dynakin.messages import Message, about, warnings_of
 from dynakin.model.markers.recognise import fits
@@ -31,7 +31,7 @@ def rehearsed(case: Case) -> tuple[Prepared | None, DynakinError | None]:
         return next(iter(prepare_case(case).values())), None
     except DynakinError as error:
         refusal = error
-    if case.config.mass_kg is None and isinstance(refusal, ModelError) and refusal.message.startswith("mass_kg"):
+    if case.config.mass_kg is None and refusal.asks_for == "mass_kg":
         somebody = case.config.changed(mass_kg=_SOME_KG).subject()
         common = replace(case.setup.common, model=case.setup.definition.with_subject(somebody))
         setup = replace(case.setup, common=common)

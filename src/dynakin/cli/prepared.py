@@ -64,7 +64,7 @@ def changed(ready: Prepared) -> Rows:
 def naming_static(refusal: DynakinError, case: Case) -> DynakinError:
     """A refusal that asks for a standing trial, with the one that lies next to the recording."""
     path = case.recording.path
-    if "(--static)" not in refusal.message or path is None or case.config.static is not None:
+    if refusal.asks_for != "static" or path is None or case.config.static is not None:
         return refusal
     static = companion_static(path, case.recording)
     return refusal if static is None else type(refusal)(f"{refusal.message} Give --static {static.name}?")

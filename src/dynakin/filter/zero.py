@@ -58,7 +58,8 @@ def standing_zero(estimator: Estimator, estimate: Estimate, static: Recording | 
     if window is None:
         raise RecordingError(
             f"{standing.path or standing.name}: nobody stands still for 0.5 s, expected a standing person for the zero "
-            "(zero = 'standing'), there or in a trial of its own (--static)"
+            "(zero = 'standing'), there or in a trial of its own (--static)",
+            asks_for="static",
         )
     if static is None and estimate.smoothed:
         coordinates = estimate.values("coordinates")[window]

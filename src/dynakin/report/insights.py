@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
+from dynakin.messages import Topic
 from dynakin.report.findings import fit, forces, recording, run, said, uncertainty
 from dynakin.report.findings.finding import Insight, Metrics
 from dynakin.results.estimate import Estimate
@@ -18,8 +19,13 @@ def in_short(found: list[Insight]) -> str:
     return f"{sentence(plural(len(titles), 'finding'))} to look at before using this run: {listed(titles, 8)}."
 
 
-DOUBTS_FORCES = frozenset({"Mass", "Subject", "Force plates", "Left at the pelvis"})
-"""Titles of warnings after which a trial's forces, or the mass that they are compared with, may be wrong."""
+OF_FORCES: frozenset[Topic] = frozenset({"weight", "mass", "height", "sex", "plates", "sum of the plates", "in step"})
+"""Topics of warnings after which a trial's forces, or the mass that they are compared with, may be wrong."""
+
+
+def doubts_forces(found: Iterable[Insight]) -> bool:
+    """Whether some of these warn of that."""
+    return any(insight.level == "warning" and not OF_FORCES.isdisjoint(insight.topics) for insight in found)
 
 
 def insights(estimate: Estimate, metrics: Metrics) -> list[Insight]:

@@ -108,7 +108,8 @@ def find_mass(
         )
         return mass, [note("mass", f"Mass {mass:.1f} kg: assumed."), warning("mass", doubt)]
     raise ModelError(
-        f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject (--mass)"
+        f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject (--mass)",
+        asks_for="mass_kg",
     )
 
 
@@ -180,7 +181,8 @@ def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) ->
             )
         raise ModelError(
             f"mass_kg is not given, and {mass_kg:.1f} kg by plates or file is no mass of a person of {height_m:.2f} m "
-            f"({index:.0f} kg/m2, expected {low:g} to {high:g}); expected mass_kg of the subject (--mass)"
+            f"({index:.0f} kg/m2, expected {low:g} to {high:g}); expected mass_kg of the subject (--mass)",
+            asks_for="mass_kg",
         )
 
 

@@ -75,7 +75,8 @@ def check_standing(landmarks: Mapping[str, Array], name: str, *, given: bool) ->
     of = "against the vertical" if worst.endswith("thigh") else "bent"
     said = f"nobody stands upright in {name}: the {worst} is {bent[worst]:.0f} deg {of}"
     if given and all(bent[knee] > SITS_DEG for knee in ("right knee", "left knee")):
-        raise ModelError(f"{said}, expected a standing trial of the person upright with straight knees (--static)")
+        expected = "a standing trial of the person upright with straight knees (--static)"
+        raise ModelError(f"{said}, expected {expected}", asks_for="static")
     return [
         warning(
             "standing",

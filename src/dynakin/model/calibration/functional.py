@@ -119,7 +119,8 @@ def _refuse_unmarked(joint: str, found: Mapping[str, Array], finder: LandmarkFin
         raise ModelError(
             f"{where}: no markers of the standing person give the {SIDE_OF[letter]} "
             f"{' and '.join(_IN_WORDS[point] for point in lacking)} (marker set {finder.match.marker_set.name}) that "
-            "the trial's is compared with; expected markers there, in the trial or in a static one (--static)"
+            "the trial's is compared with; expected markers there, in the trial or in a static one (--static)",
+            asks_for="static",
         )
 
 

@@ -273,7 +273,7 @@ def _landmarks(
         messages += check_standing(found.landmarks, source.recording.name, given=asked.static is not None)
     supposed = _supposed_legs(found, legs, marked.chosen)
     if supposed and not still.stands:
-        raise ModelError(_no_legs(supposed, source, asked.static, legs, finder))
+        raise _no_legs(supposed, source, asked.static, legs, finder)
     unmarked = tuple(name for name in LEG_JOINTS if name in (*legs.joints, *supposed))
     if unmarked:
         joints = listed([words(name) for name in sorted(unmarked)])
@@ -326,8 +326,8 @@ def _supposed_legs(found: Completed, legs: Legs, chosen: Sequence[Candidate]) ->
 
 def _no_legs(
     supposed: Sequence[str], source: Trial, static: Recording | None, legs: Legs, finder: LandmarkFinder
-) -> str:
-    """Laid out as those of an adult who stands, they are tens of degrees off where nobody does."""
+) -> ModelError:
+    """Of legs that, laid out as those of an adult who stands, are tens of degrees off where nobody does."""
     expected = "a standing trial with markers on knees and ankles (--static)"
     if static is not None:
         expected = "another one, of the person standing still with markers on knees and ankles (--static)"
@@ -336,10 +336,13 @@ def _no_legs(
     on_legs = [why for (name, _), why in match.left_out.items() if match.marker_set.marker(name).segment in LEG]
     whys = (why.removesuffix(f": {CORRECT}") for why in on_legs)
     if reasons := "; ".join(dict.fromkeys(whys)):
-        return f"{match.where}: {said}, because markers are left out: {reasons}; expected the labels corrected."
+        text = f"{match.where}: {said}, because markers are left out: {reasons}; expected the labels corrected."
+        return ModelError(text)
     if short := _one_short(supposed, finder):
-        return f"{match.where}: {short}, and nobody stands still in it; expected it, or {expected}."
-    return " ".join([f"{source.match.where}: {said}; expected {expected}.", *legs.failed])
+        text = f"{match.where}: {short}, and nobody stands still in it; expected it, or {expected}."
+    else:
+        text = " ".join([f"{match.where}: {said}; expected {expected}.", *legs.failed])
+    return ModelError(text, asks_for="static")
 
 
 def _one_short(supposed: Sequence[str], finder: LandmarkFinder) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from dynakin.messages import Topic
+
 Level = Literal["good", "note", "warning"]
 Metrics = dict[str, Any]
 
@@ -17,3 +19,5 @@ class Insight:
     title: str
     text: str
     advice: str = ""
+    topics: tuple[Topic, ...] = ()
+    """Of the messages that it is about, where it is about some."""

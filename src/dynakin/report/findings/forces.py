@@ -67,7 +67,7 @@ def left(estimate: Estimate, metrics: Metrics) -> Insight | None:
         f"At one time the motion needs {number(largest['force_n'], 'N')} more or less than the feet's plates give "
         f"({number(100.0 * largest['force_n'] / weight, '%', digits=2)} of the weight)."
     )
-    return Insight("warning", "Left at the pelvis", text, ADVICE["left"])
+    return Insight("warning", "Left at the pelvis", text, ADVICE["left"], ("sum of the plates",))
 
 
 def wrench(estimate: Estimate, metrics: Metrics) -> Insight | None:

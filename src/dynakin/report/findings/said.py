@@ -104,5 +104,5 @@ def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
     for title, topics, advice in (*_KINDS, _OTHER):
         own = [message.text for message in warnings_of(estimate.messages) if message.topic in topics]
         if own:
-            found.append(Insight("warning", title, " ".join(map(sentence, dict.fromkeys(own))), advice))
+            found.append(Insight("warning", title, " ".join(map(sentence, dict.fromkeys(own))), advice, topics))
     return found

@@ -12,7 +12,7 @@ from dynakin.files import write_csv, write_json
 from dynakin.messages import warnings_of
 from dynakin.pipeline.stages import judged
 from dynakin.progress import Progress
-from dynakin.report.insights import DOUBTS_FORCES, in_short, insights
+from dynakin.report.insights import doubts_forces, in_short, insights
 from dynakin.results.failures import Failures
 from dynakin.results.files.config import versions
 from dynakin.results.measures.fit import SignalFit
@@ -48,7 +48,8 @@ class Batch:
 
     Attributes:
         rows: by session: ``fits`` (quantity, method, figures of `SignalFit`), ``verdict`` by preset, ``findings`` (the
-            titles of what it warns of), ``notes``, of these ``warnings``, ``events``, ``nis_per_dof``.
+            titles of what it warns of), ``doubts_forces`` (whether of its mass or forces), ``notes``, of these
+            ``warnings``, ``events``, ``nis_per_dof``.
         failures: by session, why it gave nothing.
     """
 
@@ -63,7 +64,7 @@ class Batch:
     @property
     def doubted(self) -> list[str]:
         """Sessions with findings that doubt their mass or forces."""
-        return [name for name, row in self.rows.items() if DOUBTS_FORCES & set(row["findings"])]
+        return [name for name, row in self.rows.items() if row["doubts_forces"]]
 
     def table2(self) -> list[Row]:
         """The paper's Table II, mean and standard deviation over trials."""
@@ -107,6 +108,7 @@ def work_on(options: Options, payload: Session) -> dict[str, Any]:
         "fits": [[*key, *fit] for key, fit in trial_fits(trial).items()],
         "verdict": {name: in_short(each) for name, each in found.items()},
         "findings": list(dict.fromkeys(i.title for each in found.values() for i in each if i.level == "warning")),
+        "doubts_forces": any(map(doubts_forces, found.values())),
         "notes": list(map(str, said)),
         "warnings": [message.text for message in warnings_of(said)],
         "lost": lost,
