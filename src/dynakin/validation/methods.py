@@ -49,6 +49,10 @@ Mask = npt.NDArray[np.bool_]
 
 AT = "AT"
 CLASSICAL = "classical"
+ASK_FOR_INVERSE = (
+    f"{INVERSE} (inverse kinematics, low-pass, inverse dynamics) are left out, they take 4 ms a frame: dynakin compare "
+    "has them next to the filter."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,8 +218,8 @@ def trial_of(
             (`Tracker.calibrated`, `Estimator.model`).
         tolerant: a reference method that fails stops nothing: the notes say why it is left out. Else only a model
             that is no hinge chain in the plane is a note.
-        inverse: a model in space has inverse kinematics and dynamics next to it, which take 4 ms a frame; else no
-            reference.
+        inverse: a model in space has inverse kinematics and dynamics next to it; else a note
+            says where to get them.
 
     Raises:
         RecordingError: uneven time steps, or a cut-off that is not below half the rate; not with ``tolerant``.
@@ -223,13 +227,14 @@ def trial_of(
     turned = {preset: facing(estimate) for preset, estimate in estimates.items()}
     methods = [_method(f"EKF ({preset})", "EKF", estimate.data) for preset, estimate in turned.items()]
     given, first = next(iter(estimates.values())), next(iter(turned.values()))
-    notes = how_estimated(estimates)
+    notes, in_space = how_estimated(estimates), bool(first.modelled_axes().all())
     try:
-        methods += (
-            _inverse(given, initial, cutoff_hz, notes)
-            if inverse and first.modelled_axes().all()
-            else (_in_plane(first, initial, definition, cutoff_hz, notes))
-        )
+        if not in_space:
+            methods += _in_plane(first, initial, definition, cutoff_hz, notes)
+        elif inverse:
+            methods += _inverse(given, initial, cutoff_hz, notes)
+        else:
+            notes.append(note("method", ASK_FOR_INVERSE))
     except DynakinError as error:
         if not (tolerant or isinstance(error, ModelError)):
             raise
