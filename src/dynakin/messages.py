@@ -36,7 +36,7 @@ Topic = Literal[
     "details",  # the numbers of it
     "standing",  # a standing trial, or a stretch of standing, with bent legs
     "ankles",  # feet that nothing shows flat
-    "identified",  # parameters from trials that were doubted
+    "identified",  # parameters of a subject file, and what they come from
     "scaling",  # a model that does not fit the person
     "range",  # a model whose file clamps what the person does
     "noise",  # how large it was found

@@ -37,7 +37,7 @@ def test_a_subject_says_by_how_much_it_predicts_better(identified: Identificatio
     held_out = identified.subject.held_out
     assert held_out is not None and len(held_out.parts) == 4 and held_out.components == ("fx", "fy", "mz")
     gain = 100.0 * (1.0 - (np.array(held_out.bodies) / np.array(held_out.table)).mean())
-    assert f"predicted {gain:+.0f} % better (FX" in held_out.in_words()
+    assert f"predicted {gain:+z.0f} % better (FX" in held_out.in_words()
     used = with_identified(case.common.initial, identified.subject.model_copy(update={"use": "bodies"}))
     assert str(used.messages[-1]).endswith(f"{held_out.in_words()}.")
     before = identified.subject.model_copy(update={"held_out": None})  # a file of an earlier version
@@ -54,6 +54,8 @@ def test_the_table_is_kept_where_bodies_do_not_predict_better(identified: Identi
     rms = {"table": np.ones((2, 3)), "bodies": np.full((2, 3), 1.01)}
     said = Decision("table", ("a", "b"), rms, rms).in_words()  # type: ignore[arg-type]
     assert said[-1].startswith("The table is kept: held-out gain -1 %")
+    same = {"table": np.ones((2, 3)), "bodies": np.full((2, 3), 1.001)}
+    assert "-0 %" not in " ".join(Decision("table", ("a", "b"), same, same).in_words())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("full_band", "expected"), [(0.99, "bodies"), (1.01, "table")])
@@ -140,6 +142,8 @@ def test_command_line_and_a_run_with_what_it_wrote(
     file, out = command_line(files, tmp_path, capsys), tmp_path / "out"
     assert main(["run", files[0], "--forces", files[0].replace("markers.trc", "forces.mot"), *OPTIONS,
                  "--parameters", str(file), "-o", str(out)]) == 0  # fmt: skip
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Parameters" in said and "Identified inertial parameters are used, of foot, shank, thigh" in said
     assert 'use = "' in file.read_text() and 'identified = "' in (out / "config.toml").read_text()
     assert main(["run", str(out / "config.toml")]) == 0  # that record is no key that a run trips over
 

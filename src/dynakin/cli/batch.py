@@ -85,6 +85,6 @@ def batch(
     for name, preset_name, reason in lost:
         console.print(f"Lost    {name}, EKF ({preset_name}): {reason}", soft_wrap=True)
     if not result.rows:
-        raise DynakinError(f"{dataset}: none of {len(found.sessions)} trials could be worked on")
+        raise DynakinError(f"{dataset}: none of {plural(len(found.sessions), 'trial')} could be worked on")
     if result.failures or lost:
         raise typer.Exit(1)

@@ -14,7 +14,7 @@ from dynakin.model.markers.recognise import fits
 from dynakin.pipeline.stages import prepare_case
 from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.recording import Recording
-from dynakin.results.naming import sentence, words
+from dynakin.results.naming import plural, sentence, words
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import Case
 
@@ -45,7 +45,7 @@ def rehearsed(case: Case) -> tuple[Prepared | None, DynakinError | None]:
 def recording_rows(recording: Recording) -> Rows:
     """What is in the file: frames, markers, gaps, what it says of the subject, plates."""
     seconds = recording.time[-1] - recording.time[0]
-    plates = f"{len(recording.plates)} force plates" if len(recording.plates) != 1 else "1 force plate"
+    plates = plural(len(recording.plates), "force plate")
     rows: Rows = [
         (
             "Recording",
@@ -58,7 +58,7 @@ def recording_rows(recording: Recording) -> Rows:
     rows += [("In the file", f"{', '.join(subject)}.")] if subject else []
     if recording.events:
         kinds = list(dict.fromkeys(f"{event.side} {event.label}".strip().casefold() for event in recording.events))
-        rows.append(("In the file", f"{len(recording.events)} events ({', '.join(kinds)})."))
+        rows.append(("In the file", f"{plural(len(recording.events), 'event')} ({', '.join(kinds)})."))
     for plate in recording.plates:
         size = np.linalg.norm(plate.force, axis=1)
         if not np.isfinite(size).any():

@@ -9,6 +9,7 @@ from pathlib import Path
 from dynakin.cli.options import Given
 from dynakin.errors import ConfigError
 from dynakin.recordings.recording import Recording
+from dynakin.results.naming import plural
 from dynakin.settings.settings import Settings, read_keys
 from dynakin.validation.case import Case, case_of
 from dynakin.validation.held_out import halves
@@ -62,8 +63,8 @@ def cases_of(
         raise ConfigError(f"{command}: no trial was given, expected TRIAL...{pair}")
     if forces and len(forces) != len(trials):
         raise ConfigError(
-            f"{command}: --forces was given {_times(len(forces))} for {len(trials)} trials, expected one for each, "
-            "in the same order, or none"
+            f"{command}: --forces was given {_times(len(forces))} for {plural(len(trials), 'trial')}, expected one for "
+            "each, in the same order, or none"
         )
     files = [{"forces": force} for force in forces] or [{}] * len(trials)
     cases = [_case(trial, given | file, presets, cutoff_hz, command) for trial, file in zip(trials, files, strict=True)]

@@ -104,9 +104,11 @@ def _read(paths: list[Path], forces: list[Path], static: Path | None) -> tuple[l
     """The trials and the standing one, each with the ground forces given or found in its folder."""
     from dynakin.cli.compare_inputs import told_apart
     from dynakin.recordings.read import read
+    from dynakin.results.naming import plural
 
     if forces and len(forces) != len(paths):
-        raise ConfigError(f"identify: {len(forces)} force files for {len(paths)} trials, expected one a trial or none")
+        counted = f"{plural(len(forces), 'force file')} for {plural(len(paths), 'trial')}"
+        raise ConfigError(f"identify: {counted}, expected one a trial or none")
     chosen: list[Path | None] = [*forces] or [_forces_of(path) for path in paths]
     recordings = [read(path, force) for path, force in zip(paths, chosen, strict=True)]
     names = told_apart(recordings)
@@ -130,7 +132,7 @@ def _compare(paths: list[Path]) -> None:
     from dynakin.model.identified import read_identified
 
     if len(paths) != 2:
-        raise ConfigError(f"identify --compare: {len(paths)} files, expected two subject files (before, after)")
+        raise ConfigError(f"identify --compare: found {len(paths)}, expected two subject files (before, after)")
     before, after = (read_identified(path) for path in paths)
     for path, subject in zip(paths, (before, after), strict=True):
         for text in subject.warnings:

@@ -50,6 +50,9 @@ def assumed(ready: Prepared, settings: Settings) -> Rows:
     chosen = [message.text for message in about(messages, "marker set")]
     rows += [("Markers", text) for text in chosen[:1] or [f"{len(calibrated.spec.markers)} used."]]
     rows += [("Subject", in_a_row(about(messages, "mass", "height", "sex")))]
+    rows += [
+        ("Parameters", f"{settings.parameters}: {message.text}") for message in notes_of(about(messages, "identified"))
+    ]
     ahead = ", ".join(f"{value:.2f}" for value in calibrated.ground.forward + 0.0)
     rows += [("Ground", f"{calibrated.ground.vertical} is up; the person faces ({ahead}); {_sides(ready)}.")]
     return [*rows, ("Plates", _plates(ready))]

@@ -45,6 +45,7 @@ def run(
         from dynakin.cli.prepared import assumed, changed, naming_static, print_rows
         from dynakin.pipeline.stages import configure, prepare_case, run_case
         from dynakin.results.files.folder import check_folder_writable, check_output_writable
+        from dynakin.results.naming import plural
         from dynakin.validation.case import case_of
 
     config = configure(trial, given, options=True)
@@ -78,7 +79,7 @@ def run(
     if figures is not None:
         with failures.stage("figures"):
             written = result.save_figures(figures, sensitivity=grid)
-            out().print(f"Figures  {figures} ({len(written)} files)", soft_wrap=True)
+            out().print(f"Figures  {figures} ({plural(len(written), 'file')})", soft_wrap=True)
     if len(failures.found) > saved:  # what failed since then is to stand in the files too
         with failures.stage("what failed, in the files"):  # these stay as they were saved
             result.save(config.output, keep_lost=keep_lost, check=False)

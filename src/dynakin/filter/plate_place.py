@@ -63,7 +63,7 @@ def off_place(
         return None
     if whole in found:
         found = {whole: found[whole]}
-    said = [f"{name} by {np.hypot(*by):.2f} m (X {by[0]:+.2f}, Z {by[1]:+.2f})" for name, by in found.items()]
+    said = [f"{name} by {np.hypot(*by):.2f} m (X {by[0]:+z.2f}, Z {by[1]:+z.2f})" for name, by in found.items()]
     return warning(
         "place",
         f"by the movement the force does not act where the plates have it: {listed(said)}, ground frame, expected "

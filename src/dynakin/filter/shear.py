@@ -74,7 +74,7 @@ def found_shear(needed: Needed, force: Array) -> Shear:
 def not_zeroed(x: float, z: float, weight: float) -> str:
     """By how much the plates push sideways all the time, N, ground frame."""
     return (
-        f"on average the plates push sideways by {np.hypot(x, z):.0f} N (X {x:+.0f}, Z {z:+.0f}, ground frame), "
+        f"on average the plates push sideways by {np.hypot(x, z):.0f} N (X {x:+z.0f}, Z {z:+z.0f}, ground frame), "
         f"{np.hypot(x, z) / weight:.1%} of the weight"
     )
 

@@ -58,7 +58,7 @@ def change_between(before: IdentifiedSubject, after: IdentifiedSubject) -> list[
 def change_in_words(changes: list[Change], masses: tuple[float, float]) -> list[str]:
     """Sentences."""
     clear = [change for change in changes if change.clear]
-    said = [f"Mass {masses[0]:.2f} kg before, {masses[1]:.2f} kg after ({masses[1] - masses[0]:+.2f} kg)."]
+    said = [f"Mass {masses[0]:.2f} kg before, {masses[1]:.2f} kg after ({masses[1] - masses[0]:+z.2f} kg)."]
     if not clear:
         return [*said, f"None of {len(changes)} base parameters changed by more than two standard deviations."]
     said.append(f"{len(clear)} of {len(changes)} base parameters changed by more than two standard deviations:")

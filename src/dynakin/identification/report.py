@@ -48,7 +48,7 @@ class SegmentRow:
         if np.abs(self.centre).max() < _CENTRE_M:
             return ""
         ways = ("forward", "up", "right")
-        return ", ".join(f"{1e3 * x:+.0f} mm {way}" for x, way in zip(self.centre, ways, strict=False))
+        return ", ".join(f"{1e3 * x:+z.0f} mm {way}" for x, way in zip(self.centre, ways, strict=False))
 
 
 def segment_rows(posterior: Posterior) -> list[SegmentRow]:

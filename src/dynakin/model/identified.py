@@ -20,6 +20,7 @@ from dynakin.files import LARGEST_TEXT, read_bytes, write_text
 from dynakin.messages import note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
 from dynakin.model.inertia import INERTIA_NAMES
+from dynakin.results.naming import listed, plural, words
 from dynakin.settings.strict import Strict, read_toml, validate
 
 _WIDE = 3.0  # standard deviations that bounds leave on both sides
@@ -81,8 +82,8 @@ class HeldOut(Strict):
     def in_words(self) -> str:
         """The gain of the identified inertia over the table, over all and by component."""
         gain = 100.0 * (1.0 - (np.array(self.bodies) / np.array(self.table)).mean(axis=0))
-        each = [f"{name.upper()} {value:+.0f} %" for name, value in zip(self.components, gain, strict=True)]
-        return f"trials that were left out are predicted {gain.mean():+.0f} % better ({', '.join(each)})"
+        each = [f"{name.upper()} {value:+z.0f} %" for name, value in zip(self.components, gain, strict=True)]
+        return f"trials that were left out are predicted {gain.mean():+z.0f} % better ({', '.join(each)})"
 
 
 class IdentifiedSubject(Strict):
@@ -235,7 +236,7 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
     if subject.use == "table":
         gain = "" if subject.held_out is None else f"; with the identified inertia {subject.held_out.in_words()}"
         message = f"Identified parameters: the table is kept{gain}."
-        return replace(initial, messages=(*initial.messages, note("calibration", message)))
+        return replace(initial, messages=(*initial.messages, note("identified", message)))
     scale = initial.mass_kg / subject.mass_kg  # the same body, weighed anew
     values = scale * np.array(subject.batch.values)
     covariance = scale**2 * np.array(subject.batch.covariance)
@@ -259,12 +260,12 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
     spec.segments = segments
     found = JointPrior(subject.batch.names, covariance)
     gain = "" if subject.held_out is None else f"; {subject.held_out.in_words()}"
-    messages = [
-        note("calibration", f"Identified inertial parameters are used, from {', '.join(subject.trials)}{gain}.")
-    ]
+    whose = list(dict.fromkeys(words(element(name).owner) for name in known))
+    text = f"Identified inertial parameters are used, of {listed(whose, 8)}, from {', '.join(subject.trials)}{gain}."
+    messages = [note("identified", text)]
     if subject.warnings:
         count = len(subject.warnings)
-        text = f"the identified parameters come from trials that are doubted ({count} warning{'s' * (count > 1)} in the"
+        text = f"the identified parameters come from trials that are doubted ({plural(count, 'warning')} in the"
         messages.append(warning("identified", f"{text} subject file)."))
     return replace(
         initial,

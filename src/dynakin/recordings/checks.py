@@ -294,7 +294,7 @@ def _check_steps(
 
 def _compare_mass(mass: float, declared: float, standing: bool, findings: _Findings) -> None:
     ratio = mass / declared
-    text = f"the plates read {mass:.2f} kg, the declared mass is {declared:g} kg ({100 * (ratio - 1):+.1f} %)"
+    text = f"the plates read {mass:.2f} kg, the declared mass is {declared:g} kg ({100 * (ratio - 1):+z.1f} %)"
     if standing and not MASS_RATIO_REFUSED[0] < ratio < MASS_RATIO_REFUSED[1]:
         findings.refuse(f"{text}; wrong unit, or a plate is missing")
     elif standing and abs(ratio - 1) > MASS_WARNING:

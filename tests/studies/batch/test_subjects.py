@@ -65,6 +65,7 @@ def test_without_enough_plates_the_table_is_kept_and_it_says_why(dataset: Datase
     said = identify_on_trials(IdentifyOptions(tmp_path), [one, *(without(session) for session in others)])
     assert said["use"] == "table" and said["file"] is None
     assert said["said"][0].startswith("The table is kept: 1 of 3 trials can be identified on, expected two; S1/")
+    assert all(f"{session.name} has no force plates" in said["said"][0] for session in others)
     assert list(tmp_path.iterdir()) == []
     other = replace(others[0], content=others[0].content | {"mass_kg": 80.0})
     said = identify_on_trials(IdentifyOptions(tmp_path), [one, other])

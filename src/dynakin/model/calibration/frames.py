@@ -14,6 +14,7 @@ from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
+from dynakin.results.naming import plural
 
 Array = npt.NDArray[np.float64]
 
@@ -104,7 +105,7 @@ class Trial:
                 t0, t1 = self.recording.time[inside[[0, -1]]]
                 return (
                     inside,
-                    f"standing from {t0:.2f} to {t1:.2f} s of {self.recording.name} ({len(inside)} frames)",
+                    f"standing from {t0:.2f} to {t1:.2f} s of {self.recording.name} ({plural(len(inside), 'frame')})",
                 )
         first = np.flatnonzero(usable)[:FIRST_FRAMES]
         t0, t1 = self.recording.time[first[[0, -1]]]

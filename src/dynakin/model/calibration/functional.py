@@ -147,8 +147,8 @@ def _put_centre(centre: Centre, found: dict[str, Array], joint: str, turned: Arr
     return (
         f"Hip centre {SIDE_OF[joint[-1]]}: from {file} (thigh turned through {turned[0]:.0f} by {turned[1]:.0f} deg, "
         f"residual {1e3 * centre.residual_m:.1f} mm), standard deviation {1e3 * centre.sd_m:.1f} mm; "
-        f"{1e3 * float(np.linalg.norm(off)):.1f} mm from the marker set's: {forward:+.1f} forward, {up:+.1f} up, "
-        f"{outward:+.1f} outward."
+        f"{1e3 * float(np.linalg.norm(off)):.1f} mm from the marker set's: {forward:+z.1f} forward, {up:+z.1f} up, "
+        f"{outward:+z.1f} outward."
     )
 
 

@@ -138,9 +138,9 @@ def _off_place(
     x, z = np.nanmedian(np.concatenate(found), axis=0)
     return warning(
         "plates",
-        f"{plate.name} lies off its place: its centre of pressure is {np.hypot(x, z):.2f} m (X {x:+.2f}, "
-        f"Z {z:+.2f} m of the ground frame) from the middle of the {feet[k]} foot's sole while its load comes and goes "
-        "with that foot. Correct the plate's place (its corners or origin) in the file.",
+        f"{plate.name} lies off its place: its centre of pressure is {np.hypot(x, z):.2f} m (X "
+        f"{x:+z.2f}, Z {z:+z.2f} m of the ground frame) from the middle of the {feet[k]} foot's sole while its load "
+        "comes and goes with that foot. Correct the plate's place (its corners or origin) in the file.",
     )
 
 

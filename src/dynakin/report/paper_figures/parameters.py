@@ -94,7 +94,7 @@ def _changes(axes: Axes, estimate: Estimate, parameters: list[Parameter]) -> Non
     for bound in sorted({round(bound, 6) for bound in bounds if abs(bound) <= 1.05 * reached}):
         axes.axhline(bound, color=LIMIT, linewidth=0.9, linestyle=(0, (5, 3)))
         axes.annotate(
-            f"bound {bound:+.0f} %".replace("-", "−"),
+            f"bound {bound:+z.0f} %".replace("-", "−"),
             (0.01, bound),
             xycoords=("axes fraction", "data"),
             xytext=(0, 2 if bound > 0 else -2),

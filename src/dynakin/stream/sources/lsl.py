@@ -80,7 +80,7 @@ class LslSource:
             [_factor(units[k], labels[k], self._plates, self.name) if k in used else 1.0 for k in range(len(labels))]
         )
         info = StreamInfo(names, rate, self._clock, ordered=True)
-        notes = (f"lsl:{self.name}: the sender's clock is {self._correction:+.4f} s away.",)
+        notes = (f"lsl:{self.name}: the sender's clock is {self._correction:+z.4f} s away.",)
         return Streams(None, info, notes) if self._plates else Streams(info, None, notes)
 
     def read(self, timeout_s: float) -> list[Packet] | None:

@@ -15,7 +15,6 @@ from dynakin.identification.subject import identify_subject
 from dynakin.identification.trials import Common
 from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
-from dynakin.results.naming import listed
 from dynakin.settings import presets
 from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
@@ -61,7 +60,7 @@ def identify_on_trials(options: IdentifyOptions, payload: Sequence[Session]) -> 
         estimator, recordings, static, left_out = _trials(payload)
         if len(recordings) < 2:
             return _kept(
-                f"{len(recordings)} of {len(payload)} trials can be identified on, expected two; {left_out[0]}"
+                f"{len(recordings)} of {len(payload)} trials can be identified on, expected two; {'; '.join(left_out)}"
             )
         found = identify_subject(estimator, recordings, static=static)
     except OutputError:
@@ -156,7 +155,7 @@ def _trials(sessions: Sequence[Session]) -> tuple[Estimator, list[Recording], Re
             continue
         chosen.append(replace(case.recording, name=session.trial))
     if estimator is None:
-        raise DynakinError(listed(said, 3))
+        raise DynakinError("; ".join(said))
     return estimator, chosen, static, said
 
 
