@@ -85,7 +85,7 @@ def assemble(
             said = impossible_in_words(beyond, feet, forces, recording.time, weight, soles)
             reasons.append(said.text)
             notes = [*notes, said]
-    elif refused := _refused_in_words(whole):
+    if refused := _refused_in_words(whole):
         reasons.append(refused.text)
         notes = [*notes, refused]
     data = with_sources(
@@ -151,8 +151,7 @@ def assemble(
 
 
 def _refused_in_words(data: xr.Dataset) -> Message | None:
-    """On the plates' frames that were refused, of a model whose moments rest on their sum; a warning where they are
-    many."""
+    """On the plates' frames that were refused; a warning where they are many."""
     estimated = ~np.isin(data["tracking"].values, NO_ESTIMATE_CODES)
     refused = plates_refused(data) & estimated
     if not refused.any():

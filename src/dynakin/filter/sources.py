@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.contact import NO_CONTACT
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import (
     ABSENT,
@@ -46,8 +46,9 @@ def with_sources(
 
     A load is as good as the worst of the contacts behind its joint (`contact_sources`). Where something undeclared
     bears the person, it may touch any segment but those between the feet and the thighs, and a foot on no plate: what
-    lies there, or has such a foot behind it, is absent. A model that stands on its root has the plates' sum behind
-    every joint: without it, or where it was refused, all is derived, or absent where undeclared.
+    lies there, or has such a foot behind it, is absent. Where the plates were refused nothing that stands on them is
+    measured: it is derived. A model that stands on its root has the plates' sum behind every joint: without it, too,
+    all is derived, or absent where undeclared.
 
     Args:
         data: with the joints' tree and, of floating models, the core's ``moment_source``.
@@ -65,13 +66,13 @@ def with_sources(
     segments = [str(name) for name in data["joint_segment"].values]
     parents = data["joint_parent"].values
     moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
-    blind = np.isnan(values_of(data, "wrench_measured")).all(axis=1)
+    blind, refused = np.isnan(values_of(data, "wrench_measured")).all(axis=1), plates_refused(data)
     if feet is None:
-        codes = np.where(blind | plates_refused(data), DERIVED, MEASURED)[:, None]
+        codes = np.where(blind | refused, DERIVED, MEASURED)[:, None]
         joints, moments = np.tile(codes, (1, len(segments))), np.tile(codes, (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
     else:
-        contacts = _contacts(feet, undeclared, unmarked)
+        contacts = _contacts(feet, undeclared, unmarked, refused)
         if impossible is not None:
             contacts[impossible[:, None] & (contacts != MEASURED)] = ABSENT
             believed = xr.DataArray(~(impossible & blind), dims="time")
@@ -81,7 +82,7 @@ def with_sources(
         found |= {name: data[name].where(there) for name in ("foot_wrench", "foot_wrench_sd") if name in data}
         joints = _behind(contacts, [segments.index(name) for name in feet.segments], parents)
         legs = _below_the_thighs([segments.index(name) for name in soles], parents)
-        moments = values_of(data, "moment_source").copy()
+        moments = np.maximum(values_of(data, "moment_source"), np.where(refused[:, None], joints[:, moved], MEASURED))
     joints[np.ix_(undeclared, ~legs)] = ABSENT
     if feet is not None:
         joints[_beyond(feet, soles, segments, parents)] = ABSENT
@@ -169,22 +170,28 @@ class ContactSources:
         """(T, C) coordinates of which nothing is seen that they move, by their segments (`out_of_sight`)."""
         return _gone(hidden, self._segments, self._parents, frames)[:, self._moved]
 
-    def moments(self, feet: ContactLoads | None) -> Codes:
+    def moments(self, feet: ContactLoads | None, *, refused: bool = False) -> Codes:
         """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody
-        knows."""
+        knows.
+
+        Args:
+            refused: what the plates say was.
+        """
         if feet is None:
             return np.where(self._held, ABSENT, MEASURED).astype(np.uint8)[None]
         undeclared = feet.undeclared
         at = [self._segments.index(name) for name in feet.segments]
-        joints = _behind(_contacts(feet, undeclared, self._unmarked), at, self._parents)
+        contacts = _contacts(feet, undeclared, self._unmarked, np.full(len(undeclared), refused))
+        joints = _behind(contacts, at, self._parents)
         joints[np.ix_(undeclared, ~self._legs)] = ABSENT
         joints[_beyond(feet, self._soles, self._segments, self._parents)] = ABSENT
         return np.where(self._held, ABSENT, joints[:, self._moved]).astype(np.uint8)
 
 
-def _contacts(feet: ContactLoads, undeclared: Flags, unmarked: Collection[str]) -> Codes:
-    """(T, C) codes of the contacts; absent of a foot that no marker shows."""
+def _contacts(feet: ContactLoads, undeclared: Flags, unmarked: Collection[str], refused: Flags) -> Codes:
+    """(T, C) codes of the contacts; derived on plates that were refused (T,), absent of a foot that no marker shows."""
     codes = contact_sources(feet.contact, undeclared)
+    codes[refused[:, None] & (feet.contact == ON_PLATE)] = DERIVED
     codes[:, [segment in unmarked for segment in feet.segments]] = ABSENT
     return codes
 

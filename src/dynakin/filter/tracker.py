@@ -175,14 +175,14 @@ class Tracker:
         if report.diverged:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
-        sources = self._sources.moments(feet)[0]
+        unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
+        sources = self._sources.moments(feet, refused=self.verdicts[-1] == "refused" and not unmeasured)[0]
         if not self.calibrated.feet and self.verdicts[-1] != "accepted":
             sources = np.maximum(sources, np.uint8(DERIVED))
         if report.tracking in NO_ESTIMATE:
             sources = np.full_like(sources, ABSENT)
         unseen = self._sources.unseen(self._sight.look(sample.time_s, markers), 1)[0]
         sources[unseen] = ABSENT
-        unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
         blind = feet is not None and bool(feet.blind.any())
         self._off_plates |= feet is not None and stands_off_plates(feet.contact, len(self.calibrated.feet))
         segments = () if feet is None else feet.segments

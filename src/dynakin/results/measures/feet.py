@@ -39,7 +39,7 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         ``flight_frames``, in which nothing touches the ground; ``derived_frames``, ``prior_frames`` and
         ``unknown_frames``: those in which a foot's wrench is derived, a prior, or not known; ``left_at_root``: the
         largest force (N) and moment about the root (N m) that no contact gives, ``grounded`` where all contacts are
-        measured (each, or the sum of two) and in ``flight``; ``verdict``.
+        measured (each, or the sum of two; not where the plates were refused) and in ``flight``; ``verdict``.
     """
     if not estimate.foot_names or "foot_wrench" not in estimate.data:
         return None
@@ -51,7 +51,7 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     given = np.isfinite(remainder).all(axis=1)
     flight = (contact == NO_CONTACT).all(axis=1) & given
     grounded = (contact != UNMEASURED).all(axis=1) & (contact != NO_CONTACT).any(axis=1) & given
-    grounded &= _nothing_else_bears(estimate)[window]
+    grounded &= _nothing_else_bears(estimate)[window] & ~sources.plates_refused(estimate.data)[window]
     known = (contact == ON_PLATE) & grounded[:, None] & np.isfinite(adjusted).all(axis=2)  # not where it is lost
     adjustment = {
         name: _rms(COMPONENTS, adjusted[known[:, k], k]) if known[:, k].any() else None
@@ -163,7 +163,10 @@ def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float)
             + (": the model's error, or a contact that is not measured." if large else ".")
         )
     if count := figures["derived_frames"]:
-        text.append(f"In {count} of {frames} frames one contact was not measured: what depends on it is derived.")
+        text.append(
+            f"In {count} of {frames} frames one contact was not measured, or the plates were refused: what depends on "
+            "it is derived."
+        )
     if count := figures["prior_frames"]:
         text.append(
             f"In {count} of {frames} frames several contacts were not measured each on its own: how they divide the "
