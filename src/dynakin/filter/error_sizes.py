@@ -11,7 +11,7 @@ from dynakin.filter.joint_errors import Kind
 from dynakin.model.calibration.calibrated import CalibratedModel
 
 OF_JOINTS = get_args(Kind)
-KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "clock")
+KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "limbs", "clock")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
 CENTRES = ("hinge_centre", "ball_centre")
 """What goes by how far markers have moved, too."""
@@ -29,6 +29,8 @@ class Sizes:
         roll: m/rad, of how far the centre of a joint moves with its angle (knees'), where the model has that.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
         mass_centre: m, of the centre of mass of each segment off where the model has it.
+        limbs: part of the distance from its joint by which the centres of mass of a limb that no marker shows lie
+            forwards or higher than where it hangs: 0.1 to 0.3 walking, 0.7 in `truth3d`'s squats, 1 stretched out.
         clock: s, of the plates' clock off the markers': less than can be found in a walk.
         placed: m, how far (mean) markers may be found from where the model has them, for centres of joints to be as
             sure as said: of a model that was scaled worse to the person both are off, in proportion.
@@ -50,6 +52,7 @@ class Sizes:
     roll: float
     skin: float
     mass_centre: float
+    limbs: float
     clock: float
     placed: float
     own_speeds: float
@@ -57,7 +60,7 @@ class Sizes:
     inertia: bool = True
 
     def scaled(self, factor: float) -> Sizes:
-        """The errors of joints, skin, centres of mass and clock times a factor."""
+        """The errors of joints, skin, centres of mass, limbs and clock times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
 
 
@@ -71,6 +74,7 @@ LANDMARKS = Sizes(
     roll=0.007,
     skin=0.09,
     mass_centre=0.02,
+    limbs=0.6,
     clock=0.002,
     placed=np.inf,
     own_speeds=0.17,
@@ -93,6 +97,7 @@ SCALED = Sizes(
     roll=0.0,
     skin=0.08,
     mass_centre=0.003,
+    limbs=0.6,
     clock=0.002,
     placed=0.005,
     own_speeds=0.06,

@@ -12,11 +12,8 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 
 Array = npt.NDArray[np.float64]
 
-RAISED = 0.6
-"""Part of the distance from a limb's joint by which its centres of mass may lie forwards or higher than where it hangs:
-0.1 to 0.3 walking, 0.7 in `truth3d`'s squats, 1 stretched out."""
-APART = 0.3
-"""The same sidewards, of each limb by itself."""
+APART = 0.5
+"""Times as far as forwards and up a limb may lie off to its side, each by itself (`Sizes.limbs`)."""
 _AXES = 3
 
 
@@ -51,12 +48,12 @@ def unseen_limbs(calibrated: CalibratedModel) -> list[dict[str, float]]:
 
 
 def unsure_moments(limbs: Sequence[dict[str, float]], segments: Sequence[str]) -> Array:
-    """(3 B, S) standard deviations, kg m, of the first moments of segments along their axes: all limbs forwards, all of
-    them up, each to its side."""
+    """(3 B, S) what the first moments, kg m, of segments along their axes are off by where limbs are off by all of the
+    distance from their joints: all limbs forwards, all of them up, each to its side (`APART`)."""
     sources = np.zeros((len(segments), _AXES, 2 + len(limbs)))
     for k, limb in enumerate(limbs):
         for name, moment in limb.items():
             own = sources[segments.index(name)]
-            own[0, 0] = own[1, 1] = RAISED * moment
+            own[0, 0] = own[1, 1] = moment
             own[2, 2 + k] = APART * moment
     return sources.reshape(_AXES * len(segments), -1)

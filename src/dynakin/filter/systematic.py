@@ -150,11 +150,9 @@ class Systematic:
             found[kind] = self._labelled(*(np.square(values[:, chosen]).sum(axis=1) for values in outputs))
         found["skin"] = self._labelled(*self._skin(q, qd, qdd, (G, Gd, Gdd), (Tq, Tv, Ta)))
         still = np.zeros_like(q)
-        displaced = T[:, errors.first_moments] * errors.masses
-        centres = np.square(displaced).sum(axis=1)
-        if self.sizes.mass_centre:  # what limbs do is known in kg m, whatever the size of that
-            centres += np.square(T[:, errors.first_moments] @ self._limbs / self.sizes.mass_centre).sum(axis=1)
-        found["mass_centre"] = self._labelled(still, still, still, centres)
+        by_moment = T[:, errors.first_moments]
+        for kind, displaced in (("mass_centre", by_moment * errors.masses), ("limbs", by_moment @ self._limbs)):
+            found[kind] = self._labelled(still, still, still, np.square(displaced).sum(axis=1))
         return found
 
     def _rolled(self, q: Array) -> Array:
