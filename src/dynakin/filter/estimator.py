@@ -21,7 +21,7 @@ from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.skin import following_skin, may_follow
 from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
-from dynakin.filter.tracker import Tracker, known_lag
+from dynakin.filter.tracker import Tracker
 from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.declared import with_contacts, with_loads
@@ -35,7 +35,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.tracking import without_lost
 from dynakin.settings import presets
 from dynakin.settings.contacts import DeclaredContact, declared
-from dynakin.settings.lag import ALL_FRAMES, check_lag, frames_later, lag_frames
+from dynakin.settings.lag import ALL_FRAMES, check_lag, frames_later, known_lag, lag_frames
 from dynakin.settings.model import QUANTITIES, Bounds, Priors, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.settings.strict import nearest

@@ -20,13 +20,12 @@ from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sources import ContactSources, LiveSight
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.filter.systematic import Systematic, stands_off_plates
-from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from dynakin.results.records import NO_ESTIMATE
-from dynakin.settings.lag import ALL_FRAMES, LIVE_LAG_S, check_lag
+from dynakin.settings.lag import check_can_smooth
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
 
@@ -403,58 +402,3 @@ def smoothed(arrays: dict[str, Array]) -> dict[str, Array]:
     """`_core.Filter.run_smoothed`'s arrays with the smoothed ones in the places of the filtered."""
     kept = {name: values for name, values in arrays.items() if not name.startswith("smoothed_")}
     return kept | {name: arrays[source] for name, source in _PLACES.items() if source in arrays}
-
-
-SMOOTHED_WITH = ("projection", "none")
-"""Ways to keep bounds that have a smoother."""
-
-
-def can_smooth(noise: Noise) -> bool:
-    """Whether bounds are kept in a way that has a smoother."""
-    return noise.constraint in SMOOTHED_WITH
-
-
-def known_lag(asked_s: float | None, noise: Noise) -> tuple[float, list[Message]]:
-    """The lag of a recording's estimate, s: as asked, else all frames wherever these settings have a smoother; a
-    sentence where not.
-
-    Raises:
-        ConfigError: no lag that can be, or these settings have no smoother for it.
-    """
-    if asked_s is not None:
-        check_lag(asked_s)
-        if asked_s:
-            check_can_smooth(noise)
-        return float(asked_s), []
-    if can_smooth(noise):
-        return ALL_FRAMES, []
-    text = (
-        f"Not smoothed: bounds are kept by constraint {noise.constraint!r}, which has no smoother; each frame is "
-        "estimated from the frames until then, as it would be live."
-    )
-    return 0.0, [note("smoothing", text)]
-
-
-def live_lag(asked_s: float | None, noise: Noise) -> float:
-    """The lag of live use, s: as asked, else the recommended one wherever these settings have a smoother, else 0.
-
-    Raises:
-        ConfigError: no lag that can be, or these settings have no smoother for it.
-    """
-    if asked_s is None:
-        return LIVE_LAG_S if can_smooth(noise) else 0.0
-    if known_lag(asked_s, noise)[0] == ALL_FRAMES:
-        raise ConfigError(f"lag_s: live, not all frames are known, expected seconds, such as {LIVE_LAG_S:g}")
-    return float(asked_s)
-
-
-def check_can_smooth(noise: Noise) -> None:
-    """
-    Raises:
-        ConfigError: these settings keep bounds in a way that has no smoother.
-    """
-    if not can_smooth(noise):
-        raise ConfigError(
-            f"lag_s: bounds are kept by constraint {noise.constraint!r}, which has no smoother; expected 0 "
-            "(--lag 0), or 'projection' or 'none' (preset default)"
-        )

@@ -9,7 +9,6 @@ import numpy as np
 
 from dynakin.errors import RecordingError
 from dynakin.filter.samples import recording_arrays
-from dynakin.filter.tracker import can_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.declared import with_loads
 from dynakin.model.schema import kinds_of
@@ -18,6 +17,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import Signs, mean_angles, with_angles
+from dynakin.settings.lag import can_smooth
 
 if TYPE_CHECKING:
     from dynakin.filter.estimator import Estimator

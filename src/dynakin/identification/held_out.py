@@ -11,9 +11,9 @@ from dataclasses import replace
 
 from dynakin.errors import DynakinError
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.tracker import can_smooth
 from dynakin.identification.subject import identify_subject
 from dynakin.settings import presets
+from dynakin.settings.lag import can_smooth
 from dynakin.validation.held_out import IdentifyingTrial
 
 

@@ -1,10 +1,13 @@
-"""By how much an estimate may come late, so that the frames of that time help to make it."""
+"""By how much an estimate may come late, so that the frames of that time help to make it; which settings
+allow it."""
 
 from __future__ import annotations
 
 import math
 
 from dynakin.errors import ConfigError
+from dynakin.messages import Message, note
+from dynakin.settings.noise import Noise
 
 LIVE_LAG_S = 0.05
 """What live use is recommended: accelerations come 16 to 44 ms late without, and need the frames after them."""
@@ -49,3 +52,58 @@ def in_words(lag_s: float) -> str:
     if lag_s == ALL_FRAMES:
         return "from all frames"
     return "as it would be live" + (f", {1e3 * lag_s:.3g} ms late" if lag_s else "")
+
+
+SMOOTHED_WITH = ("projection", "none")
+"""Ways to keep bounds that have a smoother."""
+
+
+def can_smooth(noise: Noise) -> bool:
+    """Whether bounds are kept in a way that has a smoother."""
+    return noise.constraint in SMOOTHED_WITH
+
+
+def known_lag(asked_s: float | None, noise: Noise) -> tuple[float, list[Message]]:
+    """The lag of a recording's estimate, s: as asked, else all frames wherever these settings have a smoother; a
+    sentence where not.
+
+    Raises:
+        ConfigError: no lag that can be, or these settings have no smoother for it.
+    """
+    if asked_s is not None:
+        check_lag(asked_s)
+        if asked_s:
+            check_can_smooth(noise)
+        return float(asked_s), []
+    if can_smooth(noise):
+        return ALL_FRAMES, []
+    text = (
+        f"Not smoothed: bounds are kept by constraint {noise.constraint!r}, which has no smoother; each frame is "
+        "estimated from the frames until then, as it would be live."
+    )
+    return 0.0, [note("smoothing", text)]
+
+
+def live_lag(asked_s: float | None, noise: Noise) -> float:
+    """The lag of live use, s: as asked, else the recommended one wherever these settings have a smoother, else 0.
+
+    Raises:
+        ConfigError: no lag that can be, or these settings have no smoother for it.
+    """
+    if asked_s is None:
+        return LIVE_LAG_S if can_smooth(noise) else 0.0
+    if known_lag(asked_s, noise)[0] == ALL_FRAMES:
+        raise ConfigError(f"lag_s: live, not all frames are known, expected seconds, such as {LIVE_LAG_S:g}")
+    return float(asked_s)
+
+
+def check_can_smooth(noise: Noise) -> None:
+    """
+    Raises:
+        ConfigError: these settings keep bounds in a way that has no smoother.
+    """
+    if not can_smooth(noise):
+        raise ConfigError(
+            f"lag_s: bounds are kept by constraint {noise.constraint!r}, which has no smoother; expected 0 "
+            "(--lag 0), or 'projection' or 'none' (preset default)"
+        )

@@ -13,10 +13,11 @@ from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamErro
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.plate_motion import COARSE_S, out_of_step_in_words
 from dynakin.filter.samples import Sample
-from dynakin.filter.tracker import Tracker, live_lag
+from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, about, warning, warnings_of
 from dynakin.recordings.recording import Recording
 from dynakin.settings.defaults import DELAY_S
+from dynakin.settings.lag import live_lag
 from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.monitor import Monitor

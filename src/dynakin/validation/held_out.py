@@ -12,7 +12,7 @@ from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.total_wrench import doubtful_mass, known_ground
-from dynakin.filter.tracker import Tracker, known_lag
+from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
@@ -23,7 +23,7 @@ from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.tracking import why_lost, without_lost
-from dynakin.settings.lag import frames_later
+from dynakin.settings.lag import frames_later, known_lag
 from dynakin.settings.model import Bounds, Priors
 from dynakin.units import COMPONENTS
 from dynakin.validation.freeze import final_values, freeze, initial_values

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynakin.filter.tracker import SMOOTHED_WITH
 from dynakin.report.findings.finding import Insight, Level, Metrics
 from dynakin.report.labels import COMPONENT_LABELS, short_marker_names
 from dynakin.results.estimate import Estimate
@@ -12,6 +11,7 @@ from dynakin.results.measures.consistency import Consistency, limits
 from dynakin.results.measures.metrics import evaluation_window, speed_consistency, window_consistency
 from dynakin.results.measures.tracking import why_lost
 from dynakin.results.naming import listed, number
+from dynakin.settings.lag import SMOOTHED_WITH
 
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
 FOLLOWING = 4.0

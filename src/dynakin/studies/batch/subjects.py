@@ -10,12 +10,12 @@ from typing import Any
 from dynakin.errors import DynakinError, OutputError
 from dynakin.filter.build import estimator_of
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.tracker import can_smooth
 from dynakin.identification.subject import identify_subject
 from dynakin.identification.trials import Common
 from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
 from dynakin.settings import presets
+from dynakin.settings.lag import can_smooth
 from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
 from dynakin.studies.engine.journal import Journal
