@@ -16,9 +16,9 @@ from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.force_unit import CONVERT, STEPPING_S, likely_unit, while_loaded
+from dynakin.recordings.plates.ground_plate import SHOE_M
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N
-from dynakin.recordings.plates.surfaces import SHOE_M
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.units import GRAVITY_M_S2, PERSON_MASS_KG

@@ -26,9 +26,8 @@ from dynakin.recordings.feet.loads import FootLoads, divided
 from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.frame import GroundFrame
-from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N
-from dynakin.recordings.plates.surfaces import SAME_LEVEL_M
 from dynakin.recordings.recording import Array, Recording
 
 Flags = npt.NDArray[np.bool_]

@@ -17,8 +17,7 @@ from dynakin.recordings.feet.belt import belt_velocity
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.landmarks import find_marker
-from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.surfaces import SAME_LEVEL_M, SHOE_M, UNDER_MARKERS_M, floor_height
+from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, SHOE_M, UNDER_MARKERS_M, GroundPlate, floor_height
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.standing import marker_velocities
 

@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import wrench_about
+from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, surface_height
+from dynakin.recordings.plates.ground_plate import floor_height as recorded_floor
 from dynakin.recordings.plates.pressure import LOADED_N, Surface
 from dynakin.recordings.plates.pressure import centre_of_pressure as recorded_pressure
-from dynakin.recordings.plates.surfaces import SAME_LEVEL_M, surface_height
-from dynakin.recordings.plates.surfaces import floor_height as recorded_floor
 from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]
