@@ -18,13 +18,14 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.errors import ConfigError
-from dynakin.messages import Message, note, warning
+from dynakin.messages import note
 from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
 from dynakin.recordings.feet.findings import exchanged, plate_findings
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
 from dynakin.recordings.feet.loads import FootLoads, divided
 from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
+from dynakin.recordings.feet.who_stands_where import WhoStandsWhere
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N
@@ -317,10 +318,11 @@ class _Assignment:
         marked = np.array([contact is not None for contact in contacts], dtype=bool)
         soles = Soles.of(contacts, self.forward, self.recording.rate, self.recording.n_frames)
         loads = divided(self.feet, self.plates, soles, marked, self.on, self.off, self.hidden, self.aloft(), self.given)
-        every = range(len(self.plates))
-        reasons = [*self.off_in_words(), *(text for p in every for text in self.shared_in_words(p))]
-        reasons += [text for p in every for text in self.lost_in_words(p)]
-        said = [*self.belt_in_words(), *(text for p in every for text in self.owners_in_words(p))]
+        who = WhoStandsWhere(
+            self.recording.time, self.feet, self.contacts, self.plates, self.fixed, self.given, self.on, self.off,
+            self.hidden,
+        )  # fmt: skip
+        reasons, said = who.reasons(), who.said()
         own = [p for p in range(len(self.plates)) if p not in self.given]
         said += plate_findings(
             self.recording.time, self.feet, contacts, [self.plates[p] for p in own], soles, self.on[:, :, own]
@@ -333,84 +335,3 @@ class _Assignment:
                 )
             )
         return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons))
-
-    def spans(self, flags: Flags) -> str:
-        time = self.recording.time
-        return ", ".join(f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(flags))
-
-    def belt_in_words(self) -> list[Message]:
-        found = []
-        for name, foot in self.contacts.items():
-            speed = np.linalg.norm(foot.support_velocity, axis=1)
-            if speed.any():
-                low, high = speed[speed > 0.0].min(), speed.max()
-                size = f"{high:.2f}" if high - low < 0.02 else f"{low:.2f} to {high:.2f}"
-                found.append(
-                    note("plates", f"The {name} foot stands on a belt that moves at {size} m/s, by its markers.")
-                )
-        return found
-
-    def off_in_words(self) -> list[Message]:
-        if not self.plates:
-            return []
-        time, found, out = self.recording.time, list[Message](), "what it carries is estimated there."
-        for k, foot in enumerate(self.feet):
-            found += [
-                note(
-                    "plates", f"The {foot} foot stands off the plates from {time[a]:.2f} to {time[b - 1]:.2f} s: {out}"
-                )
-                for a, b in runs(self.off[:, k])
-            ]
-            if self.hidden[:, k].any():
-                found.append(
-                    note(
-                        "plates",
-                        f"Nobody sees where the {foot} foot is from {self.spans(self.hidden[:, k])}: it may stand off "
-                        f"the plates, so {out}",
-                    )
-                )
-        return found
-
-    def owners_in_words(self, p: int) -> list[Message]:
-        plate, owners, found = self.plates[p], self.on[:, :, p], list[Message]()
-        if p in self.given:
-            found.append(note("plates", f"{plate.name} carries the {self.given[p]} (given)."))
-        for k, foot in enumerate(self.feet):
-            if owners[:, k].any():
-                how = "given" if plate.name in self.fixed else "by its centre of pressure"
-                found.append(
-                    note("plates", f"{plate.name} carries the {foot} foot ({how}): {self.spans(owners[:, k])}.")
-                )
-        return found
-
-    def shared_in_words(self, p: int) -> list[Message]:
-        both = self.on[:, :, p].sum(axis=1) > 1
-        if not both.any():
-            return []
-        text = (
-            f"Both feet stand on {self.plates[p].name} in {np.count_nonzero(both)} frames, {self.spans(both)}: how "
-            "they divide its load is assumed."
-        )
-        return [note("plates", text)]
-
-    def lost_in_words(self, p: int) -> list[Message]:
-        plate, time = self.plates[p], self.recording.time
-        found = [
-            note(
-                "plates",
-                f"{plate.name} is not measured or at the end of its range from {time[a]:.2f} to {time[b - 1]:.2f} s: "
-                "what it carries is estimated there.",
-            )
-            for a, b in runs(~plate.known)
-        ]
-        if len(self.contacts) == len(self.feet) and p not in self.given:
-            alone = ~self.on[:, :, p].any(axis=1) & (plate.push > JUDGED_N) & ~self.hidden.any(axis=1)
-            found += [
-                warning(
-                    "plates",
-                    f"{plate.name} carries up to {np.nanmax(plate.wrench[a:b, 1]):.0f} N where no foot stands, "
-                    f"from {time[a]:.2f} to {time[b - 1]:.2f} s: the total wrench is left out there.",
-                )
-                for a, b in runs(alone)
-            ]
-        return found

@@ -1,0 +1,130 @@
+"""Who stands where, in sentences: what comes of an assignment of plates to feet (`assignment`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.arrays import runs
+from dynakin.messages import Message, note, warning
+from dynakin.recordings.feet.contact import FootContact
+from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.recording import Array
+
+Flags = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class WhoStandsWhere:
+    """
+    Attributes:
+        time: (T,) s. feet: names. contacts: of those with markers. plates: P.
+        fixed: plate -> foot or contact, as given. given: place of a plate -> the declared contact that it bears.
+        on: (T, F, P) this foot stands on this plate. off: (T, F) it may stand off the plates. hidden: (T, F) nobody
+            sees it, and it may stand anywhere.
+    """
+
+    time: Array
+    feet: tuple[str, ...]
+    contacts: Mapping[str, FootContact]
+    plates: Sequence[GroundPlate]
+    fixed: Mapping[str, str]
+    given: Mapping[int, str]
+    on: Flags
+    off: Flags
+    hidden: Flags
+
+    def said(self) -> list[Message]:
+        """Belts, and which plate carries whom."""
+        return [*self._belt(), *(text for p in range(len(self.plates)) for text in self._owners(p))]
+
+    def reasons(self) -> list[Message]:
+        """Why something is not measured."""
+        every = range(len(self.plates))
+        shared = [text for p in every for text in self._shared(p)]
+        return [*self._off(), *shared, *(text for p in every for text in self._lost(p))]
+
+    def _spans(self, flags: Flags) -> str:
+        time = self.time
+        return ", ".join(f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(flags))
+
+    def _belt(self) -> list[Message]:
+        found = []
+        for name, foot in self.contacts.items():
+            speed = np.linalg.norm(foot.support_velocity, axis=1)
+            if speed.any():
+                low, high = speed[speed > 0.0].min(), speed.max()
+                size = f"{high:.2f}" if high - low < 0.02 else f"{low:.2f} to {high:.2f}"
+                found.append(
+                    note("plates", f"The {name} foot stands on a belt that moves at {size} m/s, by its markers.")
+                )
+        return found
+
+    def _off(self) -> list[Message]:
+        if not self.plates:
+            return []
+        time, found, out = self.time, list[Message](), "what it carries is estimated there."
+        for k, foot in enumerate(self.feet):
+            found += [
+                note(
+                    "plates", f"The {foot} foot stands off the plates from {time[a]:.2f} to {time[b - 1]:.2f} s: {out}"
+                )
+                for a, b in runs(self.off[:, k])
+            ]
+            if self.hidden[:, k].any():
+                found.append(
+                    note(
+                        "plates",
+                        f"Nobody sees where the {foot} foot is from {self._spans(self.hidden[:, k])}: it may stand off "
+                        f"the plates, so {out}",
+                    )
+                )
+        return found
+
+    def _owners(self, p: int) -> list[Message]:
+        plate, owners, found = self.plates[p], self.on[:, :, p], list[Message]()
+        if p in self.given:
+            found.append(note("plates", f"{plate.name} carries the {self.given[p]} (given)."))
+        for k, foot in enumerate(self.feet):
+            if owners[:, k].any():
+                how = "given" if plate.name in self.fixed else "by its centre of pressure"
+                found.append(
+                    note("plates", f"{plate.name} carries the {foot} foot ({how}): {self._spans(owners[:, k])}.")
+                )
+        return found
+
+    def _shared(self, p: int) -> list[Message]:
+        both = self.on[:, :, p].sum(axis=1) > 1
+        if not both.any():
+            return []
+        text = (
+            f"Both feet stand on {self.plates[p].name} in {np.count_nonzero(both)} frames, {self._spans(both)}: how "
+            "they divide its load is assumed."
+        )
+        return [note("plates", text)]
+
+    def _lost(self, p: int) -> list[Message]:
+        plate, time = self.plates[p], self.time
+        found = [
+            note(
+                "plates",
+                f"{plate.name} is not measured or at the end of its range from {time[a]:.2f} to {time[b - 1]:.2f} s: "
+                "what it carries is estimated there.",
+            )
+            for a, b in runs(~plate.known)
+        ]
+        if len(self.contacts) == len(self.feet) and p not in self.given:
+            alone = ~self.on[:, :, p].any(axis=1) & (plate.push > JUDGED_N) & ~self.hidden.any(axis=1)
+            found += [
+                warning(
+                    "plates",
+                    f"{plate.name} carries up to {np.nanmax(plate.wrench[a:b, 1]):.0f} N where no foot stands, "
+                    f"from {time[a]:.2f} to {time[b - 1]:.2f} s: the total wrench is left out there.",
+                )
+                for a, b in runs(alone)
+            ]
+        return found
