@@ -1,4 +1,4 @@
-"""Knees and ankles that no marker shows: from the movement itself.
+"""Knees and ankles that no marker shows: from the movement itself, or, of who stands still, as an adult has them.
 
 Clusters of three markers and more on thigh and shank show about what these turn against each other, as in a functional
 trial: the knee's axis (SARA) and the line on which the knee lies (SCoRE). How far out along the axis that is they do
@@ -10,7 +10,7 @@ against each other counts as well, each by its variance.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note
-from dynakin.model.calibration.completion import Proportions, laid
+from dynakin.model.calibration.completion import Completed, Proportions, laid
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.functional import (
     CENTRE_RESIDUAL_M,
@@ -29,7 +29,11 @@ from dynakin.model.calibration.functional import (
     put_middles,
 )
 from dynakin.model.calibration.joint_motion import Centre, JointMotion, joint_axis, joint_centre
+from dynakin.model.calibration.landmarks import LandmarkFinder
+from dynakin.model.calibration.sites import Candidate
+from dynakin.model.markers.recognise import CORRECT, LEG
 from dynakin.recordings.recording import Recording
+from dynakin.results.naming import listed, words
 
 Array = npt.NDArray[np.float64]
 
@@ -211,3 +215,42 @@ def _check_residual(centre: Centre, bone: str) -> None:
             f"the segments below and above the {bone}'s lower end do not turn about one point (it moves by "
             f"{1e3 * centre.residual_m:.0f} mm, expected at most {1e3 * CENTRE_RESIDUAL_M:g} mm)"
         )
+
+
+def supposed_legs(found: Completed, legs: Legs, chosen: Sequence[Candidate]) -> list[str]:
+    """Knees and ankles of marked segments that are where an adult who stands has them."""
+    marked = {candidate.segment for candidate in chosen}
+    return [n for n in LEG_JOINTS if n not in legs.landmarks and n in found.added and found.added[n] in marked]
+
+
+def no_legs(
+    supposed: Sequence[str], source: Trial, static: Recording | None, legs: Legs, finder: LandmarkFinder
+) -> ModelError:
+    """Of legs that, laid out as those of an adult who stands, are tens of degrees off where nobody does."""
+    expected = "a standing trial with markers on knees and ankles (--static)"
+    if static is not None:
+        expected = "another one, of the person standing still with markers on knees and ankles (--static)"
+    said = f"no marker shows {listed([words(name) for name in supposed])}, and nobody stands still in it"
+    match = source.match
+    on_legs = [why for (name, _), why in match.left_out.items() if match.marker_set.marker(name).segment in LEG]
+    whys = (why.removesuffix(f": {CORRECT}") for why in on_legs)
+    if reasons := "; ".join(dict.fromkeys(whys)):
+        text = f"{match.where}: {said}, because markers are left out: {reasons}; expected the labels corrected."
+        return ModelError(text)
+    if short := _one_short(supposed, finder):
+        text = f"{match.where}: {short}, and nobody stands still in it; expected it, or {expected}."
+    else:
+        text = " ".join([f"{match.where}: {said}; expected {expected}.", *legs.failed])
+    return ModelError(text, asks_for="static")
+
+
+def _one_short(supposed: Sequence[str], finder: LandmarkFinder) -> str:
+    """Which marker each of these joints lacks, where it is one marker of any of them."""
+    said = []
+    for name in supposed:
+        joint, side = name.split("_")[0], "right" if name.endswith("_r") else "left"
+        ways = finder.lacking(joint, side)
+        if {len(way) for way in ways} != {1} or not finder.touched(joint, side):
+            return ""
+        said.append(f"{words(name)} is not known without {' or '.join(dict.fromkeys(m for way in ways for m in way))}")
+    return " and ".join(said)

@@ -26,12 +26,12 @@ from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmark_markers import in_both, needed_markers, seen_together, table_markers
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
-from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, Legs, legs_in_motion
+from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, Legs, legs_in_motion, no_legs, supposed_legs
 from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
-from dynakin.model.markers.recognise import CORRECT, LEG, recognise
+from dynakin.model.markers.recognise import recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
@@ -271,9 +271,9 @@ def _landmarks(
         raise ModelError("; ".join([error.message, *reasons])) from None
     if still.stands:
         messages += check_standing(found.landmarks, source.recording.name, given=asked.static is not None)
-    supposed = _supposed_legs(found, legs, marked.chosen)
+    supposed = supposed_legs(found, legs, marked.chosen)
     if supposed and not still.stands:
-        raise _no_legs(supposed, source, asked.static, legs, finder)
+        raise no_legs(supposed, source, asked.static, legs, finder)
     unmarked = tuple(name for name in LEG_JOINTS if name in (*legs.joints, *supposed))
     if unmarked:
         joints = listed([words(name) for name in sorted(unmarked)])
@@ -316,45 +316,6 @@ def _mass_and_height(
     height_m, how_high = marked.height or find_height(asked.subject, asked.recordings, still.source)
     messages += [*how, *how_high]
     return mass_kg, height_m
-
-
-def _supposed_legs(found: Completed, legs: Legs, chosen: Sequence[Candidate]) -> list[str]:
-    """Knees and ankles of marked segments that are where an adult who stands has them."""
-    marked = {candidate.segment for candidate in chosen}
-    return [n for n in LEG_JOINTS if n not in legs.landmarks and n in found.added and found.added[n] in marked]
-
-
-def _no_legs(
-    supposed: Sequence[str], source: Trial, static: Recording | None, legs: Legs, finder: LandmarkFinder
-) -> ModelError:
-    """Of legs that, laid out as those of an adult who stands, are tens of degrees off where nobody does."""
-    expected = "a standing trial with markers on knees and ankles (--static)"
-    if static is not None:
-        expected = "another one, of the person standing still with markers on knees and ankles (--static)"
-    said = f"no marker shows {listed([words(name) for name in supposed])}, and nobody stands still in it"
-    match = source.match
-    on_legs = [why for (name, _), why in match.left_out.items() if match.marker_set.marker(name).segment in LEG]
-    whys = (why.removesuffix(f": {CORRECT}") for why in on_legs)
-    if reasons := "; ".join(dict.fromkeys(whys)):
-        text = f"{match.where}: {said}, because markers are left out: {reasons}; expected the labels corrected."
-        return ModelError(text)
-    if short := _one_short(supposed, finder):
-        text = f"{match.where}: {short}, and nobody stands still in it; expected it, or {expected}."
-    else:
-        text = " ".join([f"{match.where}: {said}; expected {expected}.", *legs.failed])
-    return ModelError(text, asks_for="static")
-
-
-def _one_short(supposed: Sequence[str], finder: LandmarkFinder) -> str:
-    """Which marker each of these joints lacks, where it is one marker of any of them."""
-    said = []
-    for name in supposed:
-        joint, side = name.split("_")[0], "right" if name.endswith("_r") else "left"
-        ways = finder.lacking(joint, side)
-        if {len(way) for way in ways} != {1} or not finder.touched(joint, side):
-            return ""
-        said.append(f"{words(name)} is not known without {' or '.join(dict.fromkeys(m for way in ways for m in way))}")
-    return " and ".join(said)
 
 
 def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: npt.NDArray[np.intp]) -> Trial:
