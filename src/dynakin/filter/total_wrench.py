@@ -37,9 +37,9 @@ from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
-from dynakin.recordings.plates.force_unit import likely_unit
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
+from dynakin.recordings.weight import likely_unit
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]

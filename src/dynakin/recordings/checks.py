@@ -4,34 +4,24 @@ number."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from dynakin.messages import Message, Topic, note, warning
+from dynakin.messages import Message, note, warning
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NEAR_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.plates.force_unit import CONVERT, STEPPING_S, likely_unit, while_loaded
 from dynakin.recordings.plates.ground_plate import SHOE_M
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
-from dynakin.units import GRAVITY_M_S2, PERSON_MASS_KG
+from dynakin.recordings.weight import TILT_WARNING_DEG, Findings, check_steps, check_weight, likely_unit, while_loaded
 
-MASS_WARNING = 0.05
-"""Relative difference between declared mass and the plates' from which it is said."""
-MASS_MEAN_RATIO = (0.6, 1.1)
-"""The same for the mean of a movement: steps off the plates make it smaller, nothing makes it larger than
-m g."""
-MASS_RATIO_REFUSED = (0.2, 5.0)
-"""Plates' mass over declared mass beyond which the units or plates must be wrong; of who steps also beyond
-`MASS_RATIO_OF_UNIT` where a unit explains it."""
-MASS_RATIO_OF_UNIT = (0.35, 2.0)
 COP_REFUSED_M = 0.30
 """Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
 be wrong. From `NEAR_M` on it is said."""
@@ -42,8 +32,6 @@ HEIGHT_REFUSED_M = (-0.30, 0.45)
 """The same, beyond which the plate's height is refused: people step onto boxes on a plate, but not into a plate."""
 _HEIGHT_S = 0.1
 """So long a foot must be seen under a load for its height to be judged."""
-TILT_WARNING_DEG = 10.0
-"""Standing force against the vertical; flat standing gives 1 to 3 deg."""
 OVER_EDGE_M = 0.01
 """How far a sole that stands may reach over its plate's edge and still bring all of its load there: in the two standing
 trials that we have of which 11 kg are missing it is 18 and 27 mm, in the four that show the weight 0."""
@@ -72,21 +60,6 @@ class PlateCheck:
     unused: bool = False
 
 
-@dataclass
-class _Findings:
-    messages: list[Message] = field(default_factory=list)
-    refusals: list[str] = field(default_factory=list)
-
-    def say(self, text: str, topic: Topic = "plates") -> None:
-        self.messages.append(note(topic, text))
-
-    def warn(self, text: str, topic: Topic = "plates") -> None:
-        self.messages.append(warning(topic, text))
-
-    def refuse(self, text: str) -> None:
-        self.refusals.append(text)
-
-
 def check_plates(
     recording: Recording,
     ground: GroundFrame,
@@ -113,7 +86,7 @@ def check_plates(
     """
     if not recording.plates:
         return PlateCheck(None, None, (), "no force plates in this recording, expected at least one")
-    findings = _Findings()
+    findings = Findings()
     standing = _on_plates(standing_window(recording), recording, ground)
     frames = standing if standing is not None else slice(None)
     places = _feet(recording, ground, foot_markers or {}, findings)
@@ -121,11 +94,11 @@ def check_plates(
     if mass_kg is None and (idle := _idle(recording, ground, feet, steps_kg)):
         findings.messages.append(idle)
         return PlateCheck(None, None, tuple(findings.messages), None, unused=idle.level == "warning")
-    mass = _check_vertical(recording, ground, mass_kg, steps_kg, standing, findings)
+    mass = check_weight(recording, ground, mass_kg, steps_kg, standing, findings)
     if loads is None:
         loads = foot_loads(recording, ground, foot_markers or {})
     if steps_kg is not None:
-        _check_steps(recording, ground, steps_kg, loads, findings)
+        check_steps(recording, ground, steps_kg, loads, findings)
     under: dict[str, str] = {}
     over_edge = standing is not None and _over_the_edge(recording, ground, loads, frames, findings)
     for p, plate in enumerate(recording.plates):
@@ -197,7 +170,7 @@ def _beside(plate: Plate, ground: GroundFrame, feet: Mapping[str, Array]) -> boo
 
 
 def _over_the_edge(
-    recording: Recording, ground: GroundFrame, loads: FootLoads, frames: slice, findings: _Findings
+    recording: Recording, ground: GroundFrame, loads: FootLoads, frames: slice, findings: Findings
 ) -> bool:
     """Whether a sole that stands reaches over the edge of its plate, onto what no plate measures."""
     ahead = ground.vectors_to_ground(ground.forward)[[0, 2]]
@@ -220,93 +193,8 @@ def _over_the_edge(
     return found
 
 
-def _check_vertical(
-    recording: Recording,
-    ground: GroundFrame,
-    mass_kg: float | None,
-    steps_kg: float | None,
-    standing: slice | None,
-    findings: _Findings,
-) -> float | None:
-    total = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))
-    if standing is None:
-        loaded = total[np.abs(np.nan_to_num(total[:, 1])) > JUDGED_N]
-        when = f"mean of {len(loaded)} loaded frames; the person does not stand still for 0.5 s"
-    else:
-        loaded = total[standing]
-        start, stop = recording.time[standing.start], recording.time[standing.stop - 1]
-        when = f"standing still from {start:.4g} s to {stop:.4g} s"
-    loaded = loaded[np.isfinite(loaded).all(axis=1)]
-    if not len(loaded):
-        unit = likely_unit(while_loaded(total[:, 1]), mass_kg or steps_kg)
-        action = ""
-        if unit:
-            action = f". {CONVERT.format(unit)}"
-        elif steps_kg is None:
-            action = (
-                ", and this model needs it; give the forces of the plates that were stood on (--forces), or take "
-                "--model fullbody, which does without"
-            )
-        findings.refuse(f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N{action}")
-        return None
-    mean = loaded.mean(axis=0)
-    vertical = float(mean[1])
-    if vertical <= 0:
-        findings.refuse(
-            f"the vertical force is {vertical:.1f} N ({when}), expected a positive one near m g "
-            f"(ground on person, vertical axis {ground.vertical})"
-        )
-        return None
-    mass = vertical / GRAVITY_M_S2
-    findings.say(f"Vertical force {vertical:.1f} N, that is {mass:.2f} kg ({when}).", "weight")
-    tilt = float(np.degrees(np.arctan2(np.hypot(mean[0], mean[2]), vertical)))
-    if tilt > TILT_WARNING_DEG:
-        findings.warn(f"the mean force is {tilt:.0f} deg off the vertical {ground.vertical}, expected a few degrees.")
-    if mass_kg is not None:
-        _compare_mass(mass, mass_kg, standing is not None, findings)
-    elif standing is not None and not PERSON_MASS_KG[0] < mass < PERSON_MASS_KG[1]:
-        findings.refuse(
-            f"the plates read {mass:.3g} kg standing, expected a person's mass (nobody on the plates, or another unit "
-            "of the forces?)"
-        )
-    return mass
-
-
-def _check_steps(
-    recording: Recording, ground: GroundFrame, mass_kg: float, loads: FootLoads, findings: _Findings
-) -> None:
-    """Hold the load of who lifts each foot in turn against the weight, while all feet that stand are on plates; who
-    does not may sit."""
-    push = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))[:, 1]
-    known = loads.total_known & np.isfinite(push)
-    if not loads.aloft.any(axis=0).all() or not np.count_nonzero(known) >= STEPPING_S * recording.rate:
-        return
-    load = float(push[known].mean())
-    ratio, unit = load / (mass_kg * GRAVITY_M_S2), likely_unit(load, mass_kg)
-    low, high = MASS_RATIO_OF_UNIT if unit else MASS_RATIO_REFUSED
-    if not low < ratio < high:
-        findings.refuse(
-            f"the vertical force is {load:.3g} N on average while every foot that stands is on a plate, where "
-            f"{mass_kg:g} kg weigh {mass_kg * GRAVITY_M_S2:.0f} N. "
-            + (CONVERT.format(unit) if unit else "Look for a wrong unit, or a plate that is missing")
-        )
-
-
-def _compare_mass(mass: float, declared: float, standing: bool, findings: _Findings) -> None:
-    ratio = mass / declared
-    text = f"the plates read {mass:.2f} kg, the declared mass is {declared:g} kg ({100 * (ratio - 1):+z.1f} %)"
-    if standing and not MASS_RATIO_REFUSED[0] < ratio < MASS_RATIO_REFUSED[1]:
-        findings.refuse(f"{text}; wrong unit, or a plate is missing")
-    elif standing and abs(ratio - 1) > MASS_WARNING:
-        findings.warn(f"{text}.", "weight")
-    elif not standing and not MASS_MEAN_RATIO[0] < ratio < MASS_MEAN_RATIO[1]:
-        findings.warn(f"{text}, on average over all loaded frames; another force may act on the plates.", "weight")
-    else:
-        findings.say(f"Mass: {text}.", "weight")
-
-
 def _feet(
-    recording: Recording, ground: GroundFrame, markers: Mapping[str, Sequence[str]], findings: _Findings
+    recording: Recording, ground: GroundFrame, markers: Mapping[str, Sequence[str]], findings: Findings
 ) -> dict[str, Array]:
     """Places (T, K, 3) m of each foot's markers, ground frame."""
     feet = {foot: place for foot, (_, place) in foot_places(recording, ground, markers).items()}
@@ -329,7 +217,7 @@ def _check_pressure(
     owner: str | None,
     ground: GroundFrame,
     hidden: Sequence[str],
-    findings: _Findings,
+    findings: Findings,
 ) -> str | None:
     """Compare with the feet while all of them are seen; gives the foot that stands on the plate (``owner``, the nearest
     one where none is known), None where both or none do, or one without markers (``hidden``) may."""
@@ -372,7 +260,7 @@ def _check_pressure(
 
 
 def _check_height(
-    plate: Plate, loaded: np.ndarray, feet: Mapping[str, Array], rate: float, ground: GroundFrame, findings: _Findings
+    plate: Plate, loaded: np.ndarray, feet: Mapping[str, Array], rate: float, ground: GroundFrame, findings: Findings
 ) -> None:
     """Compare with the lowest markers of the feet under which the centre of pressure lies."""
     cop = ground.points_to_ground(plate.cop[loaded])
@@ -403,7 +291,7 @@ def _check_height(
         findings.refuse(text)
 
 
-def _check_free_moment(plate: Plate, loaded: np.ndarray, ground: GroundFrame, findings: _Findings) -> None:
+def _check_free_moment(plate: Plate, loaded: np.ndarray, ground: GroundFrame, findings: Findings) -> None:
     free = ground.vectors_to_ground(plate.free_moment[loaded]).mean(axis=0)
     push = float(ground.vectors_to_ground(plate.force[loaded])[:, 1].mean())
     about, across = float(free[1]), float(np.hypot(free[0], free[2]))
@@ -414,7 +302,7 @@ def _check_free_moment(plate: Plate, loaded: np.ndarray, ground: GroundFrame, fi
         findings.warn(f"{plate.name}: free moment has {across:.1f} N m about horizontal axes, expected none.")
 
 
-def _check_level(plate: Plate, ground: GroundFrame, findings: _Findings) -> None:
+def _check_level(plate: Plate, ground: GroundFrame, findings: Findings) -> None:
     if plate.corners is None:
         return
     sides = [b - a for a, b in pairwise(plate.corners)]
