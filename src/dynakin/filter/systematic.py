@@ -25,7 +25,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.estimate import values_of
-from dynakin.results.measures.sources import in_use, moment_sources
+from dynakin.results.measures.sources import DERIVED, MEASURED, in_use, moment_sources, plates_refused
 from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
@@ -320,7 +320,9 @@ class Systematic:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         own = {block: values_of(data, f"{block}_sd") for block in BLOCKS}
         moved = self.moved_m(states_of(data))
-        found = self.over_time(data), self.intensity(data), moved, moment_sources(data)
+        sources = moment_sources(data)
+        sources[plates_refused(data)[:, None] & (sources == DERIVED)] = MEASURED  # no surer than if they were believed
+        found = self.over_time(data), self.intensity(data), moved, sources
         off_plates = any_off_plates(data, self._feet)
         sd = reported(self.sizes, self._variance_scale, own, *found, off_plates=off_plates, late=late)
         return data.assign({f"{block}_sd": (("time", "coordinate"), sd[block]) for block in BLOCKS})

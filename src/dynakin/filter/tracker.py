@@ -238,6 +238,8 @@ class Tracker:
                 rate = self._wrench_rate(step, state, wrench)
             segments = () if step is None else step.segments
             sources, used = (None, None) if step is None else (step.sources, step.used)
+            if step is not None and not step.unmeasured:  # refused plates: no surer than believed ones
+                sources = np.where(step.sources == DERIVED, MEASURED, step.sources)
             found |= self.systematic.added(
                 found, state, covariance, wrench, segments,
                 sources=sources, off_plates=self._off_plates, late=late, used=used,
