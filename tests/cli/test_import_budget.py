@@ -36,7 +36,7 @@ def loaded(program: str) -> set[str]:
         ("import dynakin; dynakin.read", (*DRAWING, *STATISTICS, *TABLES, *FILES, *CORE, "scipy.optimize")),
         ("import dynakin; dynakin.Estimator", (*DRAWING, *STATISTICS, *TABLES, *FILES, *SEARCHES)),
         ("import dynakin; dynakin.run", (*DRAWING, *STATISTICS, *TABLES, *FILES, *SEARCHES)),
-        ("import dynakin; dynakin.Result", (*DRAWING, *STATISTICS, *FILES)),
+        ("import dynakin; dynakin.Result", (*DRAWING, *STATISTICS, *FILES, "dynakin.simulation.trial")),
         ("import dynakin.cli.prepared, dynakin.validation.case", (*DRAWING, *STATISTICS, *TABLES, *FILES, *SEARCHES)),
         ("import dynakin.cli.prepared, dynakin.cli.summary, dynakin.report.page", ("matplotlib", *STATISTICS, *FILES)),
     ],

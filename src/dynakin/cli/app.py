@@ -73,9 +73,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     DYNAKIN_DEBUG=1 in the environment lets the traceback through.
     """
-    # The matrices outside the core are small: threads of BLAS only wait for each other, on a busy machine for minutes.
-    if "OMP_NUM_THREADS" not in os.environ:
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(_MORE_BEFORE_GARBAGE)
     atexit.register(gc.freeze)  # else Python looks for reference cycles once more as it ends, for 0.3 s
     words = list(sys.argv[1:] if arguments is None else arguments)

@@ -13,7 +13,7 @@ from rich.tree import Tree
 from dynakin.cli.console import out, table
 from dynakin.errors import ConfigError
 from dynakin.filter.estimator import Estimator
-from dynakin.identification.observability.measured import tracker_of
+from dynakin.identification.observability.simulated import tracker_of
 from dynakin.identification.observability.structure import Structure, structure_of
 from dynakin.identification.observability.trial import Identifiability, identifiability
 from dynakin.model.definition import Definition, ModelDefinition, available_models, load_built_in_or_toml

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.adapt import CALIBRATED_S, Trial, calibrated_noise, frames_that_show
 from dynakin.filter.alignment import PASSES, run_in_step
@@ -126,6 +127,7 @@ class Estimator:
         for name, value in chosen.items():
             object.__setattr__(self, name, value)
 
+    @one_blas_thread
     def calibrate(self, recording: Recording, *, static: Recording | None = None) -> CalibratedModel:
         """The model of one person: measured on a recording (or the first seconds of a live one), with the identified
         parameters and the known loads, before any states are added that the noise asks for.
@@ -219,6 +221,7 @@ class Estimator:
         .osim without the displacements of skin that follow the joints)."""
         return self.follow(self.prepare(recording, static=static, lag_s=lag_s, feet=feet), progress)
 
+    @one_blas_thread
     def prepare(
         self,
         recording: Recording,
@@ -254,6 +257,7 @@ class Estimator:
         doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio, calibrated.unseen_kg)
         return Prepared(recording, tracker, markers, wrench, ground, contacts, lag_s, doubt, tuple(unsmoothed))
 
+    @one_blas_thread
     def follow(self, ready: Prepared, progress: Progress | None = None) -> Tracked:
         """The estimate of a recording that is prepared, once or again: `ready` does not change.
 

@@ -96,6 +96,8 @@ class Systematic:
         self._rolls = [first[name] for name in rolls(spec) if name in first]
         gain, N = self._gain(x)
         self._B0 = gain @ np.hstack([N, self._rolled(self._reference)])
+        kinds = np.array([*self._errors.kinds, *("roll" for _ in self._rolls)])
+        self._columns = {kind: np.flatnonzero(kinds == kind) for kind in (*OF_JOINTS, "roll")}
         self._segments = {name: k for k, name in enumerate(segments)}
         self._variance_scale = noise.variance_scale
         self._inertia = [
@@ -117,7 +119,7 @@ class Systematic:
         weight = self._root_weight if used is None else np.where(np.repeat(used, 3), self._root_weight, 0.0)
         A = jacobian[:, self._errors.free] * weight[:, None]
         normal = A.T @ A
-        normal[np.diag_indices_from(normal)] += _UNSEEN_SD**-2
+        normal.flat[:: len(normal) + 1] += _UNSEEN_SD**-2
         return -cho_solve(cho_factor(normal), (A * weight[:, None]).T), N
 
     def parts(self, q: Array, qd: Array, qdd: Array, external: Array | None = None, used: Flags | None = None) -> Parts:
@@ -143,11 +145,10 @@ class Systematic:
         direct = np.hstack([T[:, errors.placed] @ errors.sources, self._rolled_moments(q, qd, qdd, external)])
         moved = Tq @ B + Tv @ Bd + Ta @ Bdd + direct
         found: Parts = {}
-        kinds = (*errors.kinds, *("roll" for _ in self._rolls))
-        for kind in (*OF_JOINTS, "roll"):
-            chosen = [k for k, own in enumerate(kinds) if own == kind]
-            outputs = (B - self._B0, Bd, Bdd, moved)  # of angles what changes with the posture: a zero is a definition
-            found[kind] = self._labelled(*(np.square(values[:, chosen]).sum(axis=1) for values in outputs))
+        # of angles what changes with the posture: a zero is a definition
+        squares = [np.square(values) for values in (B - self._B0, Bd, Bdd, moved)]
+        for kind, chosen in self._columns.items():
+            found[kind] = self._labelled(*(values[:, chosen].sum(axis=1) for values in squares))
         found["skin"] = self._labelled(*self._skin(q, qd, qdd, (G, Gd, Gdd), (Tq, Tv, Ta)))
         still = np.zeros_like(q)
         by_moment = T[:, errors.first_moments]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.blas import one_blas_thread
 from dynakin.errors import LostError
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.batch import Posterior
@@ -47,6 +48,7 @@ class Identification:
     warned: tuple[Message, ...] = ()
 
 
+@one_blas_thread
 def identify_subject(
     estimator: Estimator,
     recordings: Sequence[Recording],

@@ -9,6 +9,7 @@ from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
+from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
@@ -30,6 +31,7 @@ if TYPE_CHECKING:  # loaded while the core works
     from dynakin.pipeline.result import Result
 
 
+@one_blas_thread
 def run(
     trial: str | Path | Recording | Settings,
     *,
@@ -135,6 +137,7 @@ def prepare_case(case: Case) -> dict[str, Prepared]:
     }
 
 
+@one_blas_thread
 def run_case(
     case: Case,
     *,
@@ -213,6 +216,7 @@ class _Ahead(Thread):
         return self._structure
 
 
+@one_blas_thread
 def judged(
     case: Case,
     estimates: Mapping[str, Estimate],

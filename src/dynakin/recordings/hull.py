@@ -15,31 +15,28 @@ def distance_to_hull(points: Array, outline: Array) -> Array:
     """Distance (T,) m of points (T, 2) from the convex hull of the corners (T, K, 2), 0 inside, NaN corners
     left out.
 
-    A point outside is as far from the hull as from the nearest of all lines between two corners; it is inside
-    if it lies in some triangle of corners. NaN where the point or all corners are missing.
+    A point outside is as far from the hull as from the nearest of all lines between two corners; it is inside if no
+    half of its horizon is without corners. NaN where the point or all corners are missing.
     """
     blocks = [slice(first, first + _FRAMES) for first in range(0, max(len(points), 1), _FRAMES)]
     return np.concatenate([_distance(points[block], outline[block]) for block in blocks])
 
 
 def _distance(points: Array, outline: Array) -> Array:
-    numbers = range(outline.shape[1])
-    pairs, triangles = list(combinations(numbers, 2)), list(combinations(numbers, 3))
-    to_point = points[:, None] - outline  # (T, K, 2)
-    distance = np.fmin.reduce(_length(to_point), axis=1, initial=np.inf)  # alone: the only other corners are missing
+    pairs = list(combinations(range(outline.shape[1]), 2))
+    from_corner = points[:, None] - outline  # (T, K, 2)
+    distance = np.fmin.reduce(_length(from_corner), axis=1, initial=np.inf)  # alone: the only other corners are missing
     if pairs:
         first, second = np.array(pairs).T
-        along, to_point = outline[:, second] - outline[:, first], to_point[:, first]
+        along, to_point = outline[:, second] - outline[:, first], from_corner[:, first]
         with np.errstate(invalid="ignore", divide="ignore"):
             share = np.clip((to_point * along).sum(axis=2) / (along**2).sum(axis=2), 0.0, 1.0)
             distance = np.fmin(distance, np.fmin.reduce(_length(to_point - share[..., None] * along), axis=1))
-    if triangles:
-        side = along[..., 0] * to_point[..., 1] - along[..., 1] * to_point[..., 0]  # of each pair
-        pair = {own: k for k, own in enumerate(pairs)}
-        ij, jk, ik = np.array([(pair[i, j], pair[j, k], pair[i, k]) for i, j, k in triangles]).T
-        around = side[:, ij], side[:, jk], -side[:, ik]
-        within = np.logical_and.reduce([one > 0 for one in around]) | np.logical_and.reduce([one < 0 for one in around])
-        distance[within.any(axis=1)] = 0.0
+        around = np.arctan2(from_corner[..., 1], from_corner[..., 0])
+        last = np.fmax.reduce(around, axis=1, keepdims=True)
+        around = np.sort(np.where(np.isnan(around), last, around), axis=1)
+        widest = np.diff(around, axis=1, append=around[:, :1] + 2.0 * np.pi).max(axis=1)
+        distance[widest < np.pi] = 0.0
     return np.where(np.isfinite(distance) & np.isfinite(points).all(axis=1), distance, np.nan)
 
 

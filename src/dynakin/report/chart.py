@@ -15,6 +15,7 @@ from dynakin.report.plot import GRID, LIMIT, by_source, thin
 from dynakin.results.measures.sources import MEASURED
 
 Array = npt.NDArray[np.float64]
+Points = npt.NDArray[np.complex128]
 Place = Callable[[Array], Array]
 
 # The picture in tenths of a point, so that whole numbers place a point to a quarter of a screen's pixel.
@@ -91,10 +92,18 @@ def chart(
     def y(value: Array) -> Array:
         return np.asarray(np.round(_BOTTOM - (_BOTTOM - _TOP) * (value - low) / (high - low)))
 
+    bands = [_band(time, line, low, high, x, y) for line in lines]
+    drawn = [
+        (line, dashes, _stretches(*thin(time, part, _MOST_POINTS), x, y))
+        for line in lines
+        for part, dashes in by_source(np.clip(line.values, low, high), line.source)
+    ]
+    simple = iter(_simplified([path for paths in (*bands, *(paths for *_, paths in drawn)) for path in paths]))
     parts = [_axes(low, high, start, end, x, y, unit, x_label)]
-    for line in lines:
-        if line.sd is not None:
-            parts.append(_band(time, line, low, high, x, y))
+    for line, edges in zip(lines, bands, strict=True):
+        if edges:
+            areas = "".join(_steps(np.concatenate([next(simple), next(simple)])) + "z" for _ in edges[::2])
+            parts.append(f'<path d="{areas}" class="spread" fill="{line.colour}"/>')
     for bound in bounds:
         level = int(y(np.array(bound.value)))
         text = f"{bound.word} {bound.value:.3g}".replace("-", "−")
@@ -102,12 +111,12 @@ def chart(
             f'<path d="M{_LEFT} {level}H{_RIGHT}" stroke="{LIMIT}" stroke-width="10" stroke-dasharray="50 30"/>'
             f'<text x="{_RIGHT}" y="{level - 18}" text-anchor="end" style="fill:{LIMIT}">{escape(text)}</text>'
         )
-    for line in lines:
-        for part, dashes in by_source(np.clip(line.values, low, high), line.source):
-            if path := _path(*thin(time, part, _MOST_POINTS), x, y):
-                more = " ".join(f"{10.0 * length:.0f}" for length in dashes) or line.dashes
-                pattern = f' stroke-dasharray="{more}"' if more else ""
-                parts.append(f'<path d="{path}" stroke="{line.colour}" stroke-width="{10 * line.width:.0f}"{pattern}/>')
+    for line, dashes, stretches in drawn:
+        if stretches:
+            path = "".join(_steps(next(simple)) for _ in stretches)
+            more = " ".join(f"{10.0 * length:.0f}" for length in dashes) or line.dashes
+            pattern = f' stroke-dasharray="{more}"' if more else ""
+            parts.append(f'<path d="{path}" stroke="{line.colour}" stroke-width="{10 * line.width:.0f}"{pattern}/>')
     label = escape(f"{title} in {unit} over {x_label.partition(',')[0]}", quote=True)
     svg = f'<svg class="chart" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{label}">{"".join(parts)}</svg>'
     return Panel(title, note, svg)
@@ -193,57 +202,58 @@ def _labels(ticks: Array) -> list[str]:
     return [f"{tick + 0.0:.{decimals}f}".replace("-", "−") for tick in ticks]
 
 
-def _path(at: Array, values: Array, x: Place, y: Place) -> str:
-    """Stretches between gaps, as moves and relative steps of whole numbers; a stretch of one point is not seen."""
-    return "".join(
-        _steps(*_simplified(x(at[first:last]), y(values[first:last])))
-        for first, last in runs(np.isfinite(values))
-        if last - first > 1
-    )
+def _stretches(at: Array, values: Array, x: Place, y: Place) -> list[Points]:
+    """Points (N,) between gaps, across and down as the real and the imaginary part; one alone is not seen."""
+    return [
+        x(at[first:last]) + 1j * y(values[first:last]) for first, last in runs(np.isfinite(values)) if last - first > 1
+    ]
 
 
-def _simplified(across: Array, down: Array) -> tuple[Array, Array]:
-    """The corners without which a line would be drawn more than `_UNSEEN` off its place (Douglas and Peucker 1973,
-    all stretches at once)."""
-    if len(across) < 3:
-        return across, down
-    points = across + 1j * down
-    kept = np.zeros(len(across), dtype=bool)
-    kept[[0, -1]] = True
+def _simplified(paths: Sequence[Points]) -> list[Points]:
+    """The corners without which lines would be drawn more than `_UNSEEN` off their places (Douglas and Peucker 1973,
+    all stretches of all lines at once)."""
+    if sum(map(len, paths)) < 3:
+        return list(paths)
+    points = np.concatenate(paths)
+    ends = np.cumsum([len(path) for path in paths])
+    kept = np.zeros(len(points), dtype=bool)
+    kept[ends - 1] = True
+    kept[[0, *ends[:-1]]] = True
     while True:
         corners = np.flatnonzero(kept)
         stretch = np.cumsum(kept) - 1
         stretch[-1] -= 1
-        chords = np.diff(points[corners])
+        chords = np.diff(points[corners])  # from one line to the next there is nothing between
         lateral = ((points - points[corners][stretch]) * chords.conj()[stretch]).imag
         away = np.abs(lateral) / np.maximum(np.abs(chords), 1.0)[stretch]
         worst = np.maximum.reduceat(away, corners[:-1])
         far = (away > _UNSEEN) & (away == worst[stretch])
         if not far.any():
-            return across[corners], down[corners]
+            return [path[own] for path, own in zip(paths, np.split(kept, ends[:-1]), strict=True)]
         kept |= far
 
 
-def _steps(across: Array, down: Array) -> str:
-    steps = np.diff(np.column_stack([across, down]), axis=0).astype(int)
+def _steps(points: Points) -> str:
+    """Moves and relative steps of whole numbers."""
+    across, down = points.real.astype(int), points.imag.astype(int)
+    steps = np.diff(np.column_stack([across, down]), axis=0)
     moved = "".join(f"{dx}{' ' if dy >= 0 else ''}{dy} " for dx, dy in steps.tolist())
-    return f"M{int(across[0])} {int(down[0])}l{moved.rstrip()}"
+    return f"M{across[0]} {down[0]}l{moved.rstrip()}"
 
 
-def _band(time: Array, line: Line, low: float, high: float, x: Place, y: Place) -> str:
-    """The band of a line, drawn from few points: it only says how wide the doubt is."""
-    assert line.sd is not None
+def _band(time: Array, line: Line, low: float, high: float, x: Place, y: Place) -> list[Points]:
+    """Edges of a line's band, above and back below, from few points: it only says how wide the doubt is."""
+    if line.sd is None:
+        return []
     kept = np.unique(np.linspace(0, len(time) - 1, _MOST_POINTS // 2).astype(int))
     values, half = line.values[kept], 2.0 * line.sd[kept]
-    parts = []
+    edges = []
     for first, last in runs(np.isfinite(values) & np.isfinite(half)):
         own = slice(first, last)
         across = x(time[kept][own])
-        above = y(np.clip(values[own] + half[own], low, high))
-        below = y(np.clip(values[own] - half[own], low, high))
-        edges = _simplified(across, above), _simplified(across[::-1], below[::-1])
-        parts.append(_steps(*(np.concatenate(pair) for pair in zip(*edges, strict=True))) + "z")
-    return f'<path d="{"".join(parts)}" class="spread" fill="{line.colour}"/>' if parts else ""
+        above, below = (y(np.clip(values[own] + side * half[own], low, high)) for side in (1.0, -1.0))
+        edges += [across + 1j * above, across[::-1] + 1j * below[::-1]]
+    return edges
 
 
 def band_is_too_wide(values: np.ndarray, sd: np.ndarray) -> bool:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.blas import one_blas_thread
 from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.plate_motion import COARSE_S, out_of_step_in_words
@@ -131,6 +132,7 @@ class Live:
         """How it goes, as of the last step."""
         return Status() if self._monitor is None else self._monitor.last
 
+    @one_blas_thread
     def run(self) -> None:
         """Until the sources end, or `stop` is called.
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.blas import one_blas_thread
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
@@ -126,6 +127,7 @@ def identify_on(
     return IdentifyingTrial(recording, static, setup, initial, estimates, wrench, ground)
 
 
+@one_blas_thread
 def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     """Every prediction of the judging trial's wrench. Its plates are taken away before anything else is done.
 

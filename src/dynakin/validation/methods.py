@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.blas import one_blas_thread
 from dynakin.errors import DynakinError, LostError, ModelError
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
@@ -130,6 +131,7 @@ class Trial:
         return mean_curves(self.time, self.repetitions.items, methods, self.mass_kg)
 
 
+@one_blas_thread
 def compare_trial(
     recording: Recording, setup: Setup, *, static: Recording | None = None, progress: Progress | None = None
 ) -> Trial:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.core_filter import filter_settings
 from dynakin.filter.estimator import Estimator
@@ -85,6 +86,7 @@ def check_horizon(recording: Recording, horizon_s: float) -> None:
         )
 
 
+@one_blas_thread
 def unseen_figures(
     recording: Recording,
     setup: Setup,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from dynakin import load_model
-from dynakin.identification.observability.measured import MeasuredModel, tracker_of
+from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.observability.simulated import tracker_of
 from dynakin.identification.observability.trial import identifiability
 from support.identifiability import Told, estimated_squat
 

@@ -20,7 +20,8 @@ from dynakin.identification.observability.gauges import (
     gauges_of,
     sparse_basis,
 )
-from dynakin.identification.observability.measured import MeasuredModel, tracker_of
+from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.observability.simulated import tracker_of
 from support.identifiability import changed_model
 
 

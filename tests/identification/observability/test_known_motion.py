@@ -14,7 +14,8 @@ from dynakin.filter.noise import process_variance
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.advice import GAIN
 from dynakin.identification.observability.known_motion import RATE_HZ, Known, KnownMotion, transition
-from dynakin.identification.observability.measured import MeasuredModel, tracker_of
+from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.observability.simulated import tracker_of
 from dynakin.settings.presets import preset
 
 Array = npt.NDArray[np.float64]

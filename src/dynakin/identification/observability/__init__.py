@@ -14,7 +14,7 @@ from dynakin.lazy import loaded_when_asked
 if TYPE_CHECKING:
     from dynakin.identification.observability.advice import GAIN
     from dynakin.identification.observability.gauges import Gauge, Gauges
-    from dynakin.identification.observability.measured import tracker_of
+    from dynakin.identification.observability.simulated import tracker_of
     from dynakin.identification.observability.structure import Structure, structure_of
     from dynakin.identification.observability.trial import BasePosterior, Identifiability, identifiability
 
@@ -35,7 +35,7 @@ __getattr__, __dir__ = loaded_when_asked(
     {
         "advice": ("GAIN",),
         "gauges": ("Gauge", "Gauges"),
-        "measured": ("tracker_of",),
+        "simulated": ("tracker_of",),
         "structure": ("Structure", "structure_of"),
         "trial": ("BasePosterior", "Identifiability", "identifiability"),
     },
