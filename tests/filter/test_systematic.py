@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from dynakin.bindings import _core
 from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes
 from dynakin.filter.joint_errors import JointErrors
-from dynakin.filter.reported_sd import BLOCKS, OWN_AT_ONCE, OWN_LATE, SPEEDS_STILL, movement_intensity, reported
+from dynakin.filter.reported_sd import BLOCKS, OWN_AT_ONCE, OWN_LATE, STILL, movement_intensity, reported
 from dynakin.filter.systematic import _STEP_S, COMMON, ROOT_SKIN, SKIN_ANGLE_RAD, Systematic, any_off_plates
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
 from dynakin.settings.noise import Noise
@@ -33,9 +33,11 @@ CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
 RATE = np.array([-900.0, 4000.0, 300.0, 200.0, 100.0, 700.0])
 """By how much the contact changes, N and N m a second."""
-SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.008, 0.3, 0.015, 0.5, 0.004)
-MOVING, OFF_PLATES = 0.1, 0.2
-NONE = Sizes(*np.zeros(len(SIZES)), placed=np.inf, own_speeds=MOVING, own_off_plates=OFF_PLATES)
+SIZES = (0.01, 0.02, 0.03, 0.05, 0.04, 0.06, 0.07, 0.008, 0.3, 0.015, 0.5, 0.004)
+MOVING, MOMENTS_MOVING, OFF_PLATES = 0.1, 0.05, 0.2
+NONE = Sizes(
+    *np.zeros(len(SIZES)), placed=np.inf, own_speeds=MOVING, own_moments=MOMENTS_MOVING, own_off_plates=OFF_PLATES
+)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
@@ -148,15 +150,19 @@ def rotation(vector: Array) -> Array:
     return np.asarray(Rotation.from_rotvec(vector).as_matrix())
 
 
-@pytest.mark.parametrize("kind", ["hinge_centre", "ball_centre", "hinge_axes"])
+@pytest.mark.parametrize("kind", ["hinge_centre", "ball_centre", "ball_across", "hinge_axes"])
 def test_effects_of_a_joint_are_those_of_a_model_that_is_changed(kind: str) -> None:
     external = np.zeros((3, 6))
     external[2] = CONTACT
     parts = systematic().parts(Q, QD, QDD, external)[kind]
     size = 1e-5
     if kind != "hinge_axes":
-        joint = "knee" if kind == "hinge_centre" else "hip"
-        wrong = [changed(**{joint: size * e}) for e in (X, Y, Z)]
+        joint, along = {
+            "hinge_centre": ("knee", (X, Y, Z)),
+            "ball_centre": ("hip", (X, Y)),
+            "ball_across": ("hip", (Z,)),
+        }[kind]
+        wrong = [changed(**{joint: size * e}) for e in along]
     else:
         wrong = [changed(turned=rotation(size * e)) for e in (X, Y, Z)]
     each = [effects(model) for model in wrong]
@@ -347,9 +353,7 @@ def test_intensity_is_the_mean_square_of_accelerations_over_their_deviations_of_
 
 def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
     """Its own part times what the movement makes of it."""
-    subject = Systematic(
-        calibrated(), Noise(), Sizes(*SIZES, placed=np.inf, own_speeds=MOVING, own_off_plates=OFF_PLATES)
-    )
+    subject = Systematic(calibrated(), Noise(), replace(NONE, **dict(zip(KINDS, SIZES, strict=True))))
     x = np.r_[Q, QD, QDD]
     P = np.zeros((30, 30))
     own = {block: np.full(10, 0.02) for block in BLOCKS} | {"accelerations": np.full(10, 2.0)}
@@ -360,7 +364,8 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     sizes = dict(zip(KINDS, SIZES, strict=True))
     intense = np.mean(QDD**2) / 4.0
     nothing = Systematic(calibrated(), Noise(), subject.sizes.scaled(0.0))
-    for late, laws in ((True, OWN_LATE | {"speeds": (SPEEDS_STILL, MOVING)}), (False, OWN_AT_ONCE)):
+    by_sizes = {"speeds": (STILL, MOVING), "moments": (STILL, MOMENTS_MOVING)}
+    for late, laws in ((True, OWN_LATE | by_sizes), (False, OWN_AT_ONCE)):
         both = subject.added(own, x, P, CONTACT[None], ["shank"], late=late, wrench_rate=RATE[None])
         alone = nothing.added(own, x, P, CONTACT[None], ["shank"], late=late, wrench_rate=RATE[None])
         for block, (still, moving) in laws.items():
@@ -401,10 +406,10 @@ def test_measured_moments_count_more_where_some_foot_stands_off_the_plates_and_p
         found = reported(NONE, scale, own, parts, np.zeros(2), np.zeros(2), source, off_plates=off_plates, late=late)
         return {block: sd**2 for block, sd in found.items()}
 
-    still, more, now = OWN_LATE["moments"][0], OFF_PLATES / scale, OWN_AT_ONCE["moments"][0]
+    still, more, now = STILL, OFF_PLATES / scale, OWN_AT_ONCE["moments"][0]
     late = variances(scale, off_plates=True, late=True)
     np.testing.assert_allclose(late["moments"], [[more, more], [still, 1.0]])
-    np.testing.assert_allclose(late["speeds"], SPEEDS_STILL)
+    np.testing.assert_allclose(late["speeds"], STILL)
     for noise_scale, off_plates in ((1.0, True), (scale, False)):  # holds as much already; none stands off the plates
         found = variances(noise_scale, off_plates=off_plates, late=True)["moments"]
         np.testing.assert_allclose(found, [[still, still], [still, 1.0]])
@@ -448,8 +453,7 @@ def test_inertia_that_small_innovations_leave_open_is_known_by_the_declared_nois
         seen = found.added(own, x, P, CONTACT[None], ["shank"], late=late)
         np.testing.assert_allclose(seen["moments"], np.sqrt(variance / 0.2), rtol=1e-6)
         np.testing.assert_array_equal(seen["speeds"], 0.0)
-    for late, laws in ((True, OWN_LATE), (False, OWN_AT_ONCE)):
-        factor = laws["moments"][0]
+    for late, factor in ((True, STILL), (False, OWN_AT_ONCE["moments"][0])):
         wide = Systematic(subject, Noise(variance_scale=1.5 / factor), NONE)  # the filter's own part has more of it
         seen = wide.added(own, x, P, CONTACT[None], ["shank"], late=late)
         np.testing.assert_allclose(seen["moments"], np.sqrt(factor * variance), rtol=1e-6)

@@ -13,7 +13,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 OF_JOINTS = get_args(Kind)
 KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "limbs", "clock")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
-CENTRES = ("hinge_centre", "ball_centre")
+CENTRES = ("hinge_centre", "ball_centre", "ball_across")
 """What goes by how far markers have moved, too."""
 
 
@@ -22,7 +22,9 @@ class Sizes:
     """Standard deviations of the errors, of each component; where they come from is in docs/derivations.md.
 
     Attributes:
-        hinge_centre, ball_centre: m, of the centre of a joint with one or two axes (knee, ankle), with three (hip).
+        hinge_centre: m, of the centre of a joint with one or two axes (knee, ankle).
+        ball_centre, ball_across: m, of the centre of one with three (hip) along the first two axes of its parent
+            (forwards and up), and along the third (to the side).
         hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar) or
             three.
         root: rad, of the turn of the pelvis' frame in the pelvis.
@@ -34,8 +36,8 @@ class Sizes:
         clock: s, of the plates' clock off the markers': less than can be found in a walk.
         placed: m, how far (mean) markers may be found from where the model has them, for centres of joints to be as
             sure as said: of a model that was scaled worse to the person both are off, in proportion.
-        own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
-            intensity (`reported_sd.OWN_LATE`).
+        own_speeds, own_moments: what the factor on the filter's own variance of smoothed speeds and moments grows by
+            with the movement's intensity (`reported_sd.OWN_LATE`).
         own_off_plates: part of the variance by the declared noise that counts at least, of late moments that are
             measured in a recording in which some foot stands off the plates, or in a session in which one has: what
             plates do not see they do not correct, and small innovations do not show it.
@@ -45,6 +47,7 @@ class Sizes:
 
     hinge_centre: float
     ball_centre: float
+    ball_across: float
     hinge_axes: float
     pair_axes: float
     ball_axes: float
@@ -56,6 +59,7 @@ class Sizes:
     clock: float
     placed: float
     own_speeds: float
+    own_moments: float
     own_off_plates: float
     inertia: bool = True
 
@@ -65,19 +69,21 @@ class Sizes:
 
 
 LANDMARKS = Sizes(
-    hinge_centre=0.0025,
-    ball_centre=0.0035,
-    hinge_axes=np.radians(2.0),
-    pair_axes=np.radians(3.0),
+    hinge_centre=0.002,
+    ball_centre=0.002,
+    ball_across=0.005,
+    hinge_axes=np.radians(2.8),
+    pair_axes=np.radians(4.0),
     ball_axes=np.radians(0.4),
-    root=np.radians(0.5),
-    roll=0.007,
+    root=np.radians(1.0),
+    roll=0.0055,
     skin=0.09,
-    mass_centre=0.02,
+    mass_centre=0.018,
     limbs=0.6,
     clock=0.002,
     placed=np.inf,
-    own_speeds=0.17,
+    own_speeds=0.13,
+    own_moments=0.03,
     own_off_plates=0.14,
 )
 """Joints that are found from markers on the skin."""
@@ -90,6 +96,7 @@ measured (`docs/validation/geometry.md`)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
     ball_centre=0.0016,
+    ball_across=0.0016,
     hinge_axes=np.radians(1.3),
     pair_axes=np.radians(1.3),
     ball_axes=np.radians(0.8),
@@ -101,6 +108,7 @@ SCALED = Sizes(
     clock=0.002,
     placed=0.005,
     own_speeds=0.06,
+    own_moments=0.0,
     own_off_plates=0.034,
     inertia=False,
 )

@@ -18,9 +18,10 @@ from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.spec import free_coordinates, free_names
 
 Array = npt.NDArray[np.float64]
-Kind = Literal["hinge_centre", "ball_centre", "hinge_axes", "pair_axes", "ball_axes", "root"]
-"""The centre of a joint with one or two axes (hinge) or three (ball) off where it is on its bones; its one axis, two
-or three turned on both of them; the root's frame turned in its bone."""
+Kind = Literal["hinge_centre", "ball_centre", "ball_across", "hinge_axes", "pair_axes", "ball_axes", "root"]
+"""The centre of a joint with one or two axes (hinge) off where it is on its bones, or with three (ball) within its
+parent's sagittal plane and across that; its one axis, two or three turned on both bones; the root's frame turned in its
+bone."""
 Column = dict[str, float]
 
 _AXES = np.eye(3)
@@ -160,7 +161,8 @@ def _names(segment: str, place: str) -> list[str]:
 def _sources(
     spec: _core.ModelSpec, orientations: dict[str, Array], held: set[str], less_sure: Mapping[str, float]
 ) -> list[tuple[Kind, Column]]:
-    """Unit errors along the ground's axes in the reference posture, by the errors' coordinates that they move."""
+    """Unit errors along the ground's axes in the reference posture, of balls' centres along their parent's, by the
+    errors' coordinates that they move."""
     planar = not all(spec.markers[0].measured)
     joints = _turning(spec)
     found: list[tuple[Kind, Column]] = []
@@ -178,12 +180,14 @@ def _sources(
         R_J = orientations[segment.parent] @ segment.rotation
         own = {axis.coordinate for axis in segment.axes if axis.kind == "rotation"}
         axes = min(len(joints[name] | own & held), 3)
-        for e in _AXES[: 2 if planar else 3]:
+        directions = orientations[segment.parent].T if axes == 3 else _AXES
+        for k, e in enumerate(directions[: 2 if planar else 3]):
             column = _along(name, "moved", R_J, e)
             for child in children:
                 column |= _along(child.name, "moved", R_B @ child.rotation, -e)
             times = less_sure.get(name, 1.0)
-            found.append(("ball_centre" if axes == 3 else "hinge_centre", {k: times * v for k, v in column.items()}))
+            kind: Kind = "hinge_centre" if axes < 3 else "ball_across" if k == 2 else "ball_centre"
+            found.append((kind, {coordinate: times * v for coordinate, v in column.items()}))
         if not planar:
             found += [(_TURNED[axes], _along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e)) for e in _AXES]
     return found

@@ -16,16 +16,16 @@ Array = npt.NDArray[np.float64]
 BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
 
 Own = dict[str, tuple[float, float]]
-OWN_LATE: Own = {"coordinates": (1.0, 0.0), "accelerations": (0.12, 0.04), "moments": (0.25, 0.0)}
+OWN_LATE: Own = {"coordinates": (1.0, 0.0), "accelerations": (0.12, 0.04)}
 """Factor on the filter's own variance of a block where later frames helped: the first number, and the second times the
 `movement_intensity`. One density of jerk serves all movements: in theory half of a speed's variance is what such jerk
-leaves unseen, and five sixths of an acceleration's; a calm movement has none of it, an intense one more. Speeds have
-`SPEEDS_STILL` and `Sizes.own_speeds`."""
-SPEEDS_STILL = 0.25
+leaves unseen, and five sixths of an acceleration's; a calm movement has none of it, an intense one more. Speeds
+and moments have `STILL` and `Sizes.own_speeds`, `own_moments`."""
+STILL = 0.25
 OWN_AT_ONCE: Own = {
     "coordinates": (1.0, 0.0),
-    "speeds": (SPEEDS_STILL, 0.4),
-    "accelerations": (SPEEDS_STILL, 0.4),
+    "speeds": (STILL, 0.4),
+    "accelerations": (STILL, 0.4),
     "moments": (0.08, 0.17),
 }
 """The same without later frames."""
@@ -62,7 +62,8 @@ def reported(
             of what rests on a prior counts in full, because how a jerk is seen has no part in that. off_plates: whether
             `Sizes.own_off_plates` counts. late: whether later frames helped.
     """
-    factors = OWN_LATE | {"speeds": (SPEEDS_STILL, sizes.own_speeds)} if late else OWN_AT_ONCE
+    by_sizes = {"speeds": (STILL, sizes.own_speeds), "moments": (STILL, sizes.own_moments)}
+    factors = OWN_LATE | by_sizes if late else OWN_AT_ONCE
     farther = np.maximum(moved_m / sizes.placed, 1.0)[..., None]
     found = {}
     for block, sd in own.items():
