@@ -30,6 +30,7 @@ Topic = Literal[
     "joints",  # joints that no marker shows
     "mass",  # where the mass comes from
     "height",
+    "physique",  # a person unlike those of the inertia tables
     "sex",
     "ground",  # what is up, and ahead
     "calibration",  # how the model was measured, and what is held still

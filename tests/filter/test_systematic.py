@@ -14,12 +14,13 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
-from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes
+from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes, usual_sizes
 from dynakin.filter.joint_errors import JointErrors
 from dynakin.filter.reported_sd import BLOCKS, OWN_AT_ONCE, OWN_LATE, STILL, movement_intensity, reported
 from dynakin.filter.systematic import _STEP_S, COMMON, ROOT_SKIN, SKIN_ANGLE_RAD, Systematic, any_off_plates
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
 from dynakin.settings.noise import Noise
+from support.made_in_space import measured
 
 Array = npt.NDArray[np.float64]
 
@@ -95,6 +96,7 @@ def calibrated() -> Any:
     return SimpleNamespace(
         unmarked_joints=(),
         one_sided_joints=(),
+        heavy=False,
         spec=model,
         names=tuple(_core.Model(model).layout.names),
         x0=_core.Model(model).initial_state(),
@@ -555,3 +557,15 @@ def test_a_joint_of_which_a_rotation_is_held_is_the_joint_that_it_was() -> None:
     seen = [set(JointErrors.of(model, np.zeros(10), held).kinds) for held in ((), ("turn",))]
     assert "pair_axes" in seen[0] and "pair_axes" not in seen[1]
     assert {"ball_axes", "ball_centre"} <= seen[1] and not {"ball_axes", "ball_centre"} & seen[0]
+
+
+def test_of_a_heavy_person_the_tables_are_not_believed_and_that_is_said() -> None:
+    """Unless identified parameters take the tables' place; an .osim has bodies of its own."""
+    usual, heavy = measured(), replace(measured(), mass_kg=100.0, height_m=1.7)
+    assert usual_sizes(usual) == LANDMARKS and usual.unlike_the_tables() == []
+    wide = usual_sizes(heavy)
+    assert wide.mass_centre >= 2.0 * LANDMARKS.mass_centre and wide.skin >= 1.5 * LANDMARKS.skin
+    (said,) = heavy.unlike_the_tables()
+    assert said.level == "warning" and "100 kg at 1.70 m (35 kg/m2)" in said.text
+    for other in (replace(heavy, height_m=None), replace(heavy, plan=None)):
+        assert not other.heavy and other.unlike_the_tables() == []

@@ -90,6 +90,9 @@ LANDMARKS = Sizes(
 UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
 """Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
 (`docs/validation/geometry.md`)."""
+HEAVY_CENTRE, HEAVY_SKIN = 3.0, 2.0
+"""Times as far off are centres of mass, and as much skin follows joints, of somebody who is `heavy`: simulated walks
+with 25 kg more on the trunk and twice the skin (`docs/validation/deviations.md`)."""
 ONE_SIDED = 0.010 / LANDMARKS.hinge_centre
 """Times as far off as others is the centre of a knee or ankle with a lateral marker alone and no width that somebody
 measured (`docs/validation/geometry.md`)."""
@@ -116,10 +119,13 @@ SCALED = Sizes(
 
 
 def usual_sizes(calibrated: CalibratedModel) -> Sizes:
-    """By where the joints of a model come from."""
+    """By where the joints of a model come from, and by the person's physique."""
     if calibrated.plan is None:
         return SCALED
-    return UNMARKED if calibrated.unmarked_joints else LANDMARKS
+    sizes = UNMARKED if calibrated.unmarked_joints else LANDMARKS
+    if calibrated.heavy:
+        return replace(sizes, mass_centre=HEAVY_CENTRE * sizes.mass_centre, skin=HEAVY_SKIN * sizes.skin)
+    return sizes
 
 
 def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:

@@ -33,6 +33,12 @@ _KINDS = (
     ),
     _Kind("Subject", ("mass", "height", "sex"), "Give the mass and the height as measured (--mass, --height)."),
     _Kind(
+        "Physique",
+        ("physique",),
+        "Identify the person's own inertia from several movements (dynakin identify) and give it (--parameters); until "
+        "then use knees and ankles alone.",
+    ),
+    _Kind(
         "Model scaling",
         ("scaling",),
         "Scale the model to the person again, by a standing trial, or run without --model: fullbody measures its own.",
