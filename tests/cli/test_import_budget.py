@@ -50,7 +50,18 @@ def test_the_help_of_every_command_loads_nothing_that_computes() -> None:
     found = loaded(f"from dynakin.cli.app import app\napp(['--help'], standalone_mode=False)\n{calls}")
     assert not found & {*DRAWING, *STATISTICS, *TABLES, *FILES, *CORE, *NUMBERS}
     layers = {name.split(".")[1] for name in found if name.startswith("dynakin.")}
-    assert layers <= {"cli", "settings", "errors", "files", "units", "elements", "arrays", "progress", "lazy"}
+    assert layers <= {
+        "cli",
+        "settings",
+        "errors",
+        "files",
+        "messages",
+        "units",
+        "elements",
+        "arrays",
+        "progress",
+        "lazy",
+    }
 
 
 def test_the_names_in_the_help_of_simulate_are_those_that_it_knows() -> None:

@@ -180,7 +180,7 @@ def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(
         "the subject weighs 75.0 kg (expected within 4 %)": [*files, *heavier],
         "the body mass is not known": [*files, *no_mass],
         "nowhere.trc": [files[0], str(tmp_path / "nowhere.trc"), *OPTIONS],
-        "1 force files for 2 trials": [*files, "--forces", "a.mot", *OPTIONS],
+        "1 force file for 2 trials": [*files, "--forces", "a.mot", *OPTIONS],
     }
     for expected, arguments in cases.items():
         assert main(["identify", *arguments, "-o", str(file)]) == 2, expected
