@@ -34,6 +34,7 @@ from dynakin.results.measures.sources import (
 )
 from dynakin.results.measures.stances import counted, phases
 from dynakin.results.measures.tracking import without_lost
+from dynakin.results.records import REFUSED
 from support.estimates.walking import MASS_KG, STANCE_S, make_walker
 
 PEAK_N = 700.0
@@ -360,3 +361,19 @@ def test_the_console_says_every_warning_once_under_the_verdict_and_the_mass_firs
     assert (first.level, first.title) == ("warning", "Mass") and "70.0 kg" in first.text
     assert not any("70.0 kg" in insight.text for insight in others)
     assert in_short([first, *others]).split(": ")[1].startswith("mass")
+
+
+def test_a_few_refused_frames_take_no_stance_out_of_the_count() -> None:
+    """Plates that were refused for 50 ms at most: what stands beside them is measured all the same."""
+    walker = make_walker()
+    everything = counted(walker, np.ones(301, dtype=bool))
+    for frames, bridged in ((4, True), (8, False)):
+        data = walker.data.copy(deep=True)
+        refused = slice(150, 150 + frames)
+        verdict = np.zeros((301, data.sizes.get("marker", 0) + 1), dtype=np.uint8)
+        verdict[refused, -1] = REFUSED
+        data["verdict"] = (("time", "sensor"), verdict)
+        data["moment_source"][refused, 0] = DERIVED
+        found = counted(replace(walker, data=data), np.ones(301, dtype=bool))
+        assert bool(found[:, 0].all()) is bridged
+        np.testing.assert_array_equal(found[:, 1:], everything[:, 1:])
