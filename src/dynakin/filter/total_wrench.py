@@ -174,7 +174,7 @@ def _known_ground(
         elif not initial.contacts and (load_kg := carried_in_hands(needed, initial, markers, total)) is not None:
             by_motion.append(warning("carried", carried_in_words(load_kg)))
         elif not initial.contacts:
-            shear = found_shear(needed, needed.closed(total))
+            shear = found_shear(needed, total)
             by_motion += shear.notes
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
     judged = _judged(recording, initial, markers, shear.zeroed(wrench), loads, check, may, by_plate, tolerance)
