@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -9,13 +10,15 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.errors import ConfigError
+from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.closure import Closure, closure
 from dynakin.filter.samples import recording_arrays
 from dynakin.filter.total_wrench import foot_markers
+from dynakin.messages import notes_of, warnings_of
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
+from dynakin.recordings.recording import Recording
 from dynakin.results.files.body import write_body_files
 from dynakin.results.files.config import write_config
 from dynakin.results.files.motion import write_deviations
@@ -198,6 +201,39 @@ def test_models_that_take_all_plates_together_have_no_contacts() -> None:
 def test_a_plate_goes_to_what_is_declared_only() -> None:
     with pytest.raises(ConfigError, match="'plate 3' is given to 'seat', expected one of right, left"):
         dynakin.Estimator(person(), plates={"plate 3": "seat"}).run(sit(1, "all").recording)
+
+
+def test_the_one_plate_that_no_foot_can_own_is_the_one_contacts_that_is_declared() -> None:
+    """It was refused, 345 mm from the nearest foot, with no word on how to say whose it is."""
+    recording = sit(1, "all").recording
+    given = dynakin.Estimator(person(), contacts=["seat"], plates={"plate 3": "seat"}).prepare(recording)
+    found = dynakin.Estimator(person(), contacts=["seat"]).prepare(recording)
+    assert any("plate 3 is taken as the seat's" in message.text for message in notes_of(found.messages))
+    assert not any("is taken as" in message.text for message in given.messages)
+    one, other = (each.ground.loads for each in (given, found))
+    assert one is not None and other is not None and other.given == one.given == {2: "seat"}
+    np.testing.assert_array_equal(other.others["seat"], one.others["seat"])
+    np.testing.assert_array_equal(found.wrench, given.wrench)
+
+
+def test_a_foots_plate_is_not_taken_for_the_seats() -> None:
+    """It is loaded while the person stands: a plate off its place stays one, there too, and is refused further away, by
+    an error that says how to name whose a plate is."""
+    recording = sit(1, "all").recording
+    foot, other, seat = recording.plates
+
+    def at_a_distance(further_m: float) -> Recording:
+        shift = np.array([1.0, 0.0, 1.0]) * np.nanmedian(seat.cop - foot.cop, axis=0) + [0.0, 0.0, further_m]
+        moved = replace(foot, cop=foot.cop + shift, moment=foot.moment + np.cross(shift, foot.force))
+        assert foot.corners is not None
+        return recording.with_plates((replace(moved, corners=foot.corners + shift), other))
+
+    estimator = dynakin.Estimator(person(), contacts=["seat"])
+    under = estimator.prepare(at_a_distance(0.0))
+    assert under.ground.loads is not None and not under.ground.loads.given
+    assert any("plate 1 lies off its place" in message.text for message in warnings_of(under.messages))
+    with pytest.raises(RecordingError, match=r'plates = \{ "its name" = "seat" \}'):
+        estimator.prepare(at_a_distance(0.8))
 
 
 def test_contacts_of_a_configuration_come_back(tmp_path: Path) -> None:

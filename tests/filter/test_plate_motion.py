@@ -16,7 +16,7 @@ from dynakin import Estimator, Subject, load_model
 from dynakin.errors import RecordingError
 from dynakin.filter import plate_motion
 from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
-from dynakin.filter.shear import NO_SHEAR
+from dynakin.filter.shear import NO_SHEAR, found_shear
 from dynakin.messages import about, warnings_of
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.resampling import low_pass
@@ -269,6 +269,22 @@ def test_plates_that_were_not_zeroed_in_shear_are_told_and_deviations_hold_it(ea
         assert sd[1] == pytest.approx(2.0 * each_n, rel=0.1)
     else:
         assert sd[1] == pytest.approx(sd[0], rel=0.05)
+
+
+@pytest.mark.parametrize("zero_n", [0.0, 20.0])
+def test_an_error_of_the_motion_that_each_step_repeats_is_no_zero_of_the_plates(zero_n: float) -> None:
+    """Of legs that alone are marked: where the vertical force does not close the horizontal one errs too, and what is
+    left does not average out (22 N of plates in order)."""
+    needed = Needed.__new__(Needed)
+    needed.time = np.arange(400) / 100.0
+    needed.rate, needed.weight, needed.whole, needed.known = 100.0, 600.0, False, np.ones(400, dtype=bool)
+    step = np.sin(2.0 * np.pi * needed.time / 0.5)
+    needed.force = np.stack([30.0 * step, 600.0 + 200.0 * np.maximum(step, 0.0), np.zeros(400)], axis=1)
+    force = np.tile([zero_n, 600.0, 0.0], (400, 1))
+    assert np.nanmean((needed.closed(force) - needed.force)[:, 0]) > zero_n + 9.0
+    found = found_shear(needed, force)
+    assert len(found.notes) == (zero_n > 0.0)
+    np.testing.assert_allclose(found.zero, [zero_n, 0.0], atol=0.5)
 
 
 @pytest.mark.parametrize(("gain", "told"), [(0.5, True), (0.9, False), (1.0, False), (1.5, True)])

@@ -22,6 +22,7 @@ from support.made_steps import (
     MadePlate,
     Stance,
     lasting,
+    sliding_in,
     steps,
     walk,
 )
@@ -163,6 +164,31 @@ def test_a_jump_is_flight_and_not_a_step() -> None:
     assert_true(made, loads)
     assert loads.total_known.all()
     assert (loads.reason[110:130] == SWING).all() and not loads.wrench[110:130].any()
+
+
+def test_a_foot_that_is_loaded_before_it_is_slow_has_its_load() -> None:
+    """A tall person's heel moves by 0.7 m/s for 90 ms after it strikes, in which it took 260 N: nobody's."""
+    feet = walk(5, 0.6)
+    made = sliding_in(steps(lasting(5), feet, plates_of(feet, (0.25, 0.2))), feet, late_s=0.09)
+    loads = found(made)
+    assert not [message for message in loads.messages if message.level == "warning"]
+    assert loads.total_known.all()
+    assert_true(made, loads, 25.0)
+
+
+@pytest.mark.parametrize(("moved", "its"), [(0.25, True), (0.9, False)])
+def test_a_load_that_is_nobodys_leaves_no_foot_near_it_in_the_air(moved: float, its: bool) -> None:
+    """A plate that is said to lie 0.25 m aside may bear any foot near it; one at 0.9 m bears something else."""
+    feet = walk(4, 0.6)
+    plates = [replace(plate, moved=(0.0, moved if plate.name == "p1" else 0.0)) for plate in plates_of(feet)]
+    made = sliding_in(steps(lasting(4), feet, plates), feet, late_s=0.09)
+    loads, time = found(made), made.recording.time
+    lands = (made.push[:, 1] > 55.0) & (time < 0.6) & (loads.reason[:, 1] != OFF_PLATE)
+    assert lands.any() and not loads.total_known[lands].any()
+    assert (loads.reason[lands, 1] == (UNKNOWN if its else SWING)).all()
+    passes = np.abs(made.sole[:, 0, 0] - made.sole[:, 1, 0]) < 0.25  # the other foot, over that load
+    passes &= (made.push[:, 1] > 55.0) & (time < 1.1)
+    assert passes.sum() > 5 and (loads.reason[passes, 0] == (UNKNOWN if its else SWING)).all()
 
 
 def test_one_foot_over_two_plates_has_both() -> None:

@@ -339,6 +339,23 @@ def test_the_console_says_first_what_is_measured(monkeypatch: pytest.MonkeyPatch
     assert "off the plates from 1.70 to 2.30 s" in second
 
 
+def test_a_verdict_says_in_a_clause_what_it_found_where_the_sentences_stand_above(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It said only what to do about it."""
+    walker, text = make_walker((2,)), io.StringIO()
+    lost = [
+        warning("plates", f"plate {k} carries up to 266 N where no foot stands, from 0.34 to 0.37 s: it is left out.")
+        for k in (2, 4)
+    ]
+    monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=1000))
+    known = {"ground": {"reasons": [message.text for message in lost]}}
+    summary.print_summary(Result(replace(walker, messages=lost, config=walker.config | known)), Path("out"))
+    clause = "Plate 2 carries up to 266 N where no foot stands, from 0.34 to 0.37 s, and 1 more (above)."
+    assert f"  Force plates: {clause}" in text.getvalue().splitlines()
+    assert text.getvalue().count("it is left out") == 2
+
+
 def test_the_console_says_every_warning_once_under_the_verdict_and_the_mass_first(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -354,9 +371,11 @@ def test_the_console_says_every_warning_once_under_the_verdict_and_the_mass_firs
     assert text.getvalue().casefold().count("the plates carry") == 1
     data = walker.data.assign(moments=walker.data["moments"].where(walker.data["coordinate"] != "knee_angle_r"))
     text.seek(0)
-    known = {"ground": {"reasons": [light.text]}}  # said first, as a reason, and not again
+    known = {"ground": {"reasons": [light.text]}}  # said first, as a reason, and then in a clause
     summary.print_summary(Result(replace(doubted, data=data, config=doubted.config | known)), Path("out"))
-    assert text.getvalue()[: text.tell()].casefold().count("the plates carry") == 1
+    clause = "  Mass: The plates carry 70.0 kg on average where the person weighs 40.0 kg (above)."
+    assert text.getvalue()[: text.tell()].casefold().count("the plates carry") == 2
+    assert clause in text.getvalue()[: text.tell()].splitlines()
     (first, *others) = insights(doubted, compute_metrics(doubted))
     assert (first.level, first.title) == ("warning", "Mass") and "70.0 kg" in first.text
     assert not any("70.0 kg" in insight.text for insight in others)

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, FootLoads
+from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
 from dynakin.recordings.standing import marker_velocities
 from dynakin.settings import presets
 from dynakin.stream.feet import LiveFeet
-from support.made_steps import FOOT_MARKERS, LABORATORY, Made, MadePlate, Stance, lasting, steps, walk
+from support.made_steps import FOOT_MARKERS, LABORATORY, Made, MadePlate, Stance, lasting, sliding_in, steps, walk
 
 
 def live(made: Made) -> list[FootLoads]:
@@ -125,3 +125,21 @@ def test_stance_rises_and_falls_live() -> None:
             middle = (made.recording.time > stance.start + 0.2) & (made.recording.time < stance.end - 0.05)
             swing = (made.recording.time > stance.end + 0.18) & (made.recording.time < stance.end + 0.3)
             assert weights[middle, k].min() > 0.9 and weights[swing, k].max() < 0.05
+
+
+@pytest.mark.parametrize("moved", [0.0, 0.25])
+def test_a_foot_that_is_loaded_before_it_is_slow_is_never_in_the_air_live(moved: float) -> None:
+    """It has its load, or, where that is said to lie aside and is nobody's, what it carries is not known."""
+    feet = walk(4, 0.6)
+    plates = [
+        MadePlate(s.plates[0], (s.x - 0.25, s.x + 0.25), (s.z - 0.2, s.z + 0.2), moved=(0.0, moved))
+        for s in (*feet["right"], *feet["left"])
+    ]
+    made = sliding_in(steps(lasting(4), feet, plates), feet, late_s=0.09)
+    reasons, push, _, _ = both(made)
+    loaded = made.push > 60.0
+    assert not (reasons[loaded] == SWING).any()
+    if moved:
+        assert (reasons[loaded] == UNKNOWN).any()
+    else:
+        assert np.abs(push - made.push)[loaded & (reasons == MEASURED)].max() < 25.0

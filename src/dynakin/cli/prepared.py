@@ -90,7 +90,8 @@ def contacts(ready: Prepared) -> Rows:
         text = "; ".join(said[:_MOST_SPANS]) + (f"; and {rest} more" if rest > 0 else "")
         rows.append(("Contacts", f"{foot}: {text or 'never on the ground'}."))
     for name, bears in zip(ready.calibrated.contacts, ready.ground.bears.T, strict=True):
-        rows.append(("Contacts", f"{name} (declared): {_times(time, bears)}."))
+        own = [names[p] for p, contact in loads.given.items() if contact == name]
+        rows.append(("Contacts", f"{name} (declared): {listed(own) if own else _times(time, bears)}."))
     return rows
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -53,14 +54,24 @@ def _print_verdict(console: Console, found: list[Insight], reasons: Sequence[str
     warned = [each for each in found if each.level == "warning"]
     console.print(f"Verdict: {' '.join(said)}", style="yellow" if warned else "green")
     for each in warned:
-        text = each.text
-        for reason in reasons:
+        text, above = each.text, [reason for reason in reasons if reason in each.text]
+        for reason in above:
             text = text.replace(reason, "").strip()
+        if above and not text:
+            text = _in_a_clause(above)
         if text:
             console.print(f"  {each.title}: {text}", style="yellow")
         if each.advice:
             console.print(f"  {each.title}, what to do: {each.advice}", style="dim")
     console.print()
+
+
+def _in_a_clause(reasons: Sequence[str]) -> str:
+    """The first of some sentences that stand above, without what follows a colon or a bracket, and how many more there
+    are."""
+    rest = re.compile(r": | \(|\.$").search(reasons[0], len("Plate 1, plate 2: "))
+    more = f", and {len(reasons) - 1} more" if len(reasons) > 1 else ""
+    return f"{reasons[0][: rest.start() if rest else None]}{more} (above)."
 
 
 def end(result: Result) -> None:

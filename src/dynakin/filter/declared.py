@@ -9,6 +9,10 @@ import scipy
 from dynakin.arrays import runs, widened
 from dynakin.filter.closure import Closure
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.recording import Recording
 from dynakin.settings.contacts import SEAT
 
 Array = npt.NDArray[np.float64]
@@ -21,6 +25,34 @@ STANDING = 0.53
 """Height of the middle of the pelvis' markers over that of the person, of who is seen seated only."""
 MARGIN_S = 0.15
 """How long before and after the excess is seen the contact comes and goes: it is smoothed over that."""
+
+UNDER_M, ALWAYS = 0.3, 0.95
+"""A plate is a contact's of its own where it presses within so much of it, horizontally, by the median: a seat is as
+large as that. And where the contact may bear for that part of its load: a foot's plate is loaded while somebody stands,
+too."""
+
+
+def plate_of_its_own(
+    recording: Recording, initial: CalibratedModel, loads: FootLoads, paths: Array, may: Flags
+) -> str | None:
+    """The plate of the one contact that is declared: the only one on which no foot ever stands and that presses at it;
+    None where there is no such plate, or more than one of either.
+
+    Args:
+        loads: of the feet, by all plates. paths: (T, 2, 3) m, of `ContactPaths`. may: (T, 1) of `may_bear`.
+    """
+    if len(initial.contacts) != 1 or loads.given:
+        return None
+    found = []
+    for p, plate in enumerate(recording.plates):
+        own = GroundPlate.of(plate, initial.ground)
+        judged = own.push > JUDGED_N
+        if not judged.any() or loads.on[judged, :, p].any():
+            continue
+        away = np.linalg.norm(own.cop[judged] - paths[judged, 1][:, [0, 2]], axis=1)
+        if float(np.median(away)) < UNDER_M and may[judged, 0].mean() > ALWAYS:
+            found.append(plate.name)
+    return found[0] if len(found) == 1 else None
 
 
 def may_bear(initial: CalibratedModel, paths: Array, floor_m: float, tallest_m: float) -> Flags:

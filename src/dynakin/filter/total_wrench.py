@@ -13,7 +13,7 @@ from dynakin.arrays import runs
 from dynakin.errors import RecordingError
 from dynakin.filter.carried import carried_in_hands, carried_in_words
 from dynakin.filter.closure import Closure, closure
-from dynakin.filter.declared import bearing, may_bear
+from dynakin.filter.declared import bearing, may_bear, plate_of_its_own
 from dynakin.filter.expected import ContactPaths
 from dynakin.filter.plate_clock import Delay, clock_delay
 from dynakin.filter.plate_motion import (
@@ -139,7 +139,12 @@ def _known_ground(
     """`known_ground` of plates that are in step within some milliseconds, or (not ``in_step``) are brought into it."""
     n = recording.n_frames
     loads = _loads_of_feet(recording, initial, assigned)
-    may, by_plate = _declared_contacts(initial, markers, loads)
+    paths, may = _declared_contacts(initial, markers)
+    taken = None if loads is None else plate_of_its_own(recording, initial, loads, paths, may)
+    if taken is not None:
+        loads = _loads_of_feet(recording, initial, {**(assigned or {}), taken: next(iter(initial.contacts))})
+    by_plate = [loads is not None and name in loads.others for name in initial.contacts]
+    may &= ~np.array(by_plate, dtype=bool)
     if not recording.plates:
         text = (
             "No force plates: the ground reaction follows from the motion where one foot may stand, and where both may "
@@ -152,7 +157,7 @@ def _known_ground(
     steps_kg = initial.weighed_kg if initial.feet and not initial.contacts else None
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads, steps_kg)
     if check.refusal:
-        raise RecordingError(f"{recording.plates_file}: {check.refusal}")
+        raise RecordingError(f"{recording.plates_file}: {check.refusal}{_how_to_give(initial, loads)}")
     if check.unused:
         ground, nothing = _known_ground(recording.with_plates(()), initial, markers, np.full_like(wrench, np.nan))
         loads = ground.loads
@@ -160,6 +165,8 @@ def _known_ground(
             loads = replace(loads, on=np.zeros((n, len(loads.feet), len(recording.plates)), dtype=bool))
         return replace(ground, loads=loads, notes=(*check.messages, *ground.notes)), nothing
     by_motion, shear = list[Message](), NO_SHEAR
+    if taken is not None:
+        by_motion.append(note("plates", _taken_in_words(taken, next(iter(initial.contacts)))))
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
         if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
@@ -174,7 +181,7 @@ def _known_ground(
         elif not initial.contacts and (load_kg := carried_in_hands(needed, initial, markers, total)) is not None:
             by_motion.append(warning("carried", carried_in_words(load_kg)))
         elif not initial.contacts:
-            shear = found_shear(needed, needed.closed(total))
+            shear = found_shear(needed, total)
             by_motion += shear.notes
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
     judged = _judged(recording, initial, markers, shear.zeroed(wrench), loads, check, may, by_plate, tolerance)
@@ -217,14 +224,28 @@ def _loads_of_feet(
     return replace(loads, reasons=(*loads.reasons, note("plates", text)))
 
 
-def _declared_contacts(initial: CalibratedModel, markers: Array, loads: FootLoads | None) -> tuple[Flags, list[bool]]:
-    """(T, C) frames in which each declared contact may bear where no plate measures it, and which ones a plate does."""
-    names = list(initial.contacts)
-    by_plate = [loads is not None and name in loads.others for name in names]
+def _declared_contacts(initial: CalibratedModel, markers: Array) -> tuple[Array, Flags]:
+    """(T, 1 + C, 3) m where the root and the declared contacts are; (T, C) frames in which each of these may bear."""
+    paths = ContactPaths.of(initial).at(markers)
+    if not initial.contacts:
+        return paths, np.zeros((len(markers), 0), dtype=bool)
+    floor = float(np.nanmin(markers[..., 1]))
+    return paths, may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor)
+
+
+def _taken_in_words(plate: str, contact: str) -> str:
+    return (
+        f"{plate} is taken as the {contact}'s: no foot stands on it, and it presses where the {contact} is. If it is "
+        f'not, name whose it is in a configuration: plates = {{ "{plate}" = "right" }}.'
+    )
+
+
+def _how_to_give(initial: CalibratedModel, loads: FootLoads | None) -> str:
+    """What to do about a plate that is refused while a declared contact has none."""
+    names = [name for name in initial.contacts if loads is not None and name not in loads.others]
     if not names:
-        return np.zeros((len(markers), 0), dtype=bool), by_plate
-    paths, floor = ContactPaths.of(initial).at(markers), float(np.nanmin(markers[..., 1]))
-    return may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor) & ~np.array(by_plate), by_plate
+        return ""
+    return f'. If that plate bears the {names[0]}, say so in a configuration: plates = {{ "its name" = "{names[0]}" }}'
 
 
 class _Judged(NamedTuple):

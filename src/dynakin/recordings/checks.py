@@ -110,7 +110,7 @@ def check_plates(
             findings.say(f"{plate.name} carries nothing ({'standing' if standing else 'the whole recording'}).")
             continue
         if p in loads.given:
-            findings.say(f"{plate.name} bears the {loads.given[p]}, as given.")
+            findings.say(f"{plate.name} bears the {loads.given[p]}.")
             continue
         hidden = [name for name, own in (foot_markers or {}).items() if not own]
         foot = _check_pressure(plate, loaded, feet, _owner(loads, loaded, p), ground, hidden, findings)

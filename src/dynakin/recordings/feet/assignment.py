@@ -125,11 +125,17 @@ class _Assignment:
         for k, foot in enumerate(feet):
             if foot in contacts:
                 self.stances(k, contacts[foot])
-        aloft, steps = self.aloft(), self.steps()
+        self.aloft, steps = self.in_the_air(), self.steps()
+        low = np.zeros((n, F), dtype=bool)
+        for k, foot in enumerate(feet):
+            if foot in contacts:
+                low[:, k] = contacts[foot].low
         for p, plate in enumerate(plates):
             self.presses(p, plate)
-            self.on[:, :, p] |= to_the_end(self.on[:, :, p], plate.pressed, steps) & ~aloft
-            self.on[:, :, p] &= ~aloft | (plate.push > JUDGED_N)[:, None]
+            self.on[:, :, p] &= ~self.aloft | (plate.push > JUDGED_N)[:, None]
+            whole = to_the_end(self.on[:, :, p], plate.pressed, steps)
+            self.aloft &= ~(whole & low & self.under[:, :, p])  # a heel is loaded before it is slow
+            self.on[:, :, p] |= whole & ~self.aloft
             self.passed_on(p, plate)
         for k, foot in enumerate(feet):
             if foot in contacts:
@@ -297,7 +303,7 @@ class _Assignment:
         raised = foot.support_m[frames] > min(heights) + 2.0 * SAME_LEVEL_M
         return np.asarray(((away > BEYOND_M) & touching).any(axis=1) & ~raised)
 
-    def aloft(self) -> Flags:
+    def in_the_air(self) -> Flags:
         """(T, F) feet that are surely in the air: high and moving between two stances of their own, or moving while
         another one stands still. A pedal moves with the foot that presses it, and lets it stand nowhere."""
         found = np.zeros(self.off.shape, dtype=bool)
@@ -317,7 +323,7 @@ class _Assignment:
         contacts = [self.contacts.get(foot) for foot in self.feet]
         marked = np.array([contact is not None for contact in contacts], dtype=bool)
         soles = Soles.of(contacts, self.forward, self.recording.rate, self.recording.n_frames)
-        loads = divided(self.feet, self.plates, soles, marked, self.on, self.off, self.hidden, self.aloft(), self.given)
+        loads = divided(self.feet, self.plates, soles, marked, self.on, self.off, self.hidden, self.aloft, self.given)
         who = WhoStandsWhere(
             self.recording.time, self.feet, self.contacts, self.plates, self.fixed, self.given, self.on, self.off,
             self.hidden,

@@ -17,6 +17,9 @@ from dynakin.recordings.recording import Array
 
 Flags = npt.NDArray[np.bool_]
 
+NOT_ITS_M = 0.45
+"""So far from the middle of a foot's sole a load is not that foot's, wherever the plate's place is not refused: half a
+sole, and 0.3 m (`checks.COP_REFUSED_M`)."""
 SWING, MEASURED, SHARED, OFF_PLATE, UNKNOWN = range(5)
 REASONS = ("swing", "measured", "shared plate", "off the plates", "plate not measured")
 """Words for the numbers in `FootLoads.reason`."""
@@ -37,7 +40,7 @@ class FootLoads:
         all_measured: (T,) frames in which that holds and no plate is shared: each foot's wrench is a measurement.
         elsewhere: (T,) frames in which something else may bear the person: no plate measures at all, a plate carries
             what no foot puts on it, or (`with_undeclared`) the motion needs what the plates do not have.
-        aloft: (T, F) feet that are surely in the air, by their markers alone.
+        aloft: (T, F) feet that are surely in the air: by their markers, and because no load that is nobody's is near.
         soles: where the feet's soles are, when they may bear load, and where it is expected.
         on: (T, F, P) which foot stands on which plate: the run's one assignment.
         given: number of a plate -> the declared contact that bears on it, where it is no foot's.
@@ -117,7 +120,7 @@ def divided(
     Args:
         marked: (F,) the foot has markers.
         on: (T, F, P) this foot stands on this plate. off: (T, F) it may stand off the plates. hidden: (T, F) it may
-            stand anywhere: nobody sees it. aloft: (T, F) it is surely in the air.
+            stand anywhere: nobody sees it. aloft: (T, F) it is in the air by its markers.
         given: number of a plate -> the declared contact that bears on it, where it is no foot's.
     """
     given = dict(given or {})
@@ -128,13 +131,17 @@ def divided(
     known = np.stack([plate.known for plate in plates], axis=1) if plates else np.zeros((n, 0), dtype=bool)
     alone, both = owners & (count == 1)[:, None], owners & (count > 1)[:, None]
     wrench, reason = np.zeros((n, F, 6)), np.full((n, F), SWING, dtype=np.int8)
-    nobodys = np.zeros(n, dtype=bool)
+    nobodys, aloft = np.zeros(n, dtype=bool), aloft.copy()
     for k, p in enumerate(of_feet):
         wrench += np.where(alone[:, :, k, None], plates[p].wrench[:, None], 0.0)
         if both[:, :, k].any():
             shared = np.flatnonzero(count[:, k] > 1)
             wrench[shared] += _shares(plates[p], shared, owners[:, :, k], soles.middle)
-        nobodys |= (count[:, k] == 0) & (plates[p].push > JUDGED_N)
+        lost = (count[:, k] == 0) & (plates[p].push > JUDGED_N)
+        if lost.any():
+            away = np.linalg.norm(plates[p].cop[:, None] - soles.middle[:, :, [0, 2]], axis=2)
+            aloft &= ~lost[:, None] | (away > NOT_ITS_M)
+            nobodys |= lost
     others: dict[str, Array] = {}
     for p, name in given.items() if plates else ():
         bears = np.linalg.norm(filled(plates[p].wrench[:, :3]), axis=1) > UNLOADED_N

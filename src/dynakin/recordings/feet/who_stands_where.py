@@ -88,7 +88,7 @@ class WhoStandsWhere:
     def _owners(self, p: int) -> list[Message]:
         plate, owners, found = self.plates[p], self.on[:, :, p], list[Message]()
         if p in self.given:
-            found.append(note("plates", f"{plate.name} carries the {self.given[p]} (given)."))
+            found.append(note("plates", f"{plate.name} carries the {self.given[p]}."))
         for k, foot in enumerate(self.feet):
             if owners[:, k].any():
                 how = "given" if plate.name in self.fixed else "by its centre of pressure"
