@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from dynakin.filter.closure import smoothed
 from dynakin.filter.mass_centre import mass_centre
+from dynakin.filter.plate_lean import root_path, turned_by_lean
 from dynakin.filter.samples import in_step
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.plates.axes import TURNS, PlateAxes, turned_feet
@@ -72,12 +73,13 @@ class Needed:
     Attributes:
         time: (T,) s. rate: Hz. weight: N, with what is carried.
         force: (T, 3) N, ground axes. known: (T,) frames in which it is. whole: all of the body is marked.
+        root: (T, 3) m, `root_path`.
     """
 
     def __init__(self, initial: CalibratedModel, time: Array, markers: Array) -> None:
         found = mass_centre(initial, time, markers)
         self.time, self.rate, self.weight = time, rate_of(time), initial.weighed_kg * GRAVITY_M_S2
-        self.whole = not initial.unseen_kg
+        self.whole, self.root = not initial.unseen_kg, root_path(initial, markers)
         self.known: Flags = np.zeros(len(time), dtype=bool) if found is None else found.known
         self.force = np.zeros((len(time), 3)) if found is None else found.needed_force(initial.weighed_kg)
 
@@ -201,7 +203,11 @@ def turned_axes(
     """
     if initial.contacts or not plates:
         return None
-    found = turned_feet(plates, initial.ground, needed.rate) or _turned_sum(needed, plates, initial, known)
+    found = (
+        turned_feet(plates, initial.ground, needed.rate)
+        or _turned_sum(needed, plates, initial, known)
+        or turned_by_lean(plates, initial, needed.root, needed.rate)
+    )
     if found is None:
         return None
     if not remedy and plates[0].corners is None:  # columns of a table
