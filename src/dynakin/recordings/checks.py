@@ -146,13 +146,20 @@ def _idle(
         return None
     if len(feet) > 1 and all(_beside(plate, ground, feet) for plate in recording.plates):
         return note("plates", "Nobody steps on the plates: they carry nothing, and no foot is on any.")
+    known = np.all([np.isfinite(plate.force).all(axis=1) for plate in recording.plates], axis=0)
+    without = "it is run as one without plates, and the ground reaction follows from the motion"
+    if not known.all():
+        return warning(
+            "plates",
+            f"the plates carry nobody in the {np.count_nonzero(known)} of {len(known)} frames in which they are "
+            f"measured (they read {most:.1f} N at most): {without}.",
+        )
     unit = likely_unit(while_loaded(np.sum(pushes, axis=0)), steps_kg)
     perhaps = f", and whether they are in {unit}, not N" if unit else ""
     return warning(
         "plates",
-        f"the plates carry nobody in this recording (they read {most:.1f} N at most): it is run as one "
-        "without plates, and the ground reaction follows from the motion. If somebody steps on them, look whether "
-        f"their channels were connected{perhaps}.",
+        f"the plates carry nobody in this recording (they read {most:.1f} N at most): {without}. If somebody steps on "
+        f"them, look whether their channels were connected{perhaps}.",
     )
 
 

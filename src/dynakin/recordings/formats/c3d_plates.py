@@ -18,6 +18,7 @@ from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plate_types import TYPES, plate_wrench
+from dynakin.recordings.formats.c3d_range import at_end_of_range
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
@@ -86,7 +87,7 @@ def read_plates(
     for k in range(int(used)):
         name = f"plate {k + 1}"
         try:
-            raw, said = _raw(name, parameters, k, analog, markers, unit_m)
+            raw, said = _raw(name, parameters, k, analog, step, markers, unit_m)
             check_wrench(name, analog_time, raw.force, raw.moment, "")
         except RecordingError as error:
             why = str(error).removeprefix(": ").removeprefix(f"{name} ")
@@ -115,9 +116,9 @@ def read_plates(
 
 
 def _raw(
-    name: str, parameters: Parameters, k: int, analog: Array, markers: Array, unit_m: float
+    name: str, parameters: Parameters, k: int, analog: Array, step_s: float, markers: Array, unit_m: float
 ) -> tuple[_Raw, list[Message]]:
-    """Plate k, and notes.
+    """Plate k, and notes; step_s: between samples.
 
     Raises:
         RecordingError: why it cannot be read.
@@ -165,6 +166,18 @@ def _raw(
             notes.append(note("plates", f"{name}: the file gives no unit for its moments: N m taken, as else {stays}."))
     origin = _origin(parameters, k, kind) * unit_m
     force, moment = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=factors)
+    if (ended := at_end_of_range(analog[channels], force[:, 2])).any():
+        seconds = np.count_nonzero(ended) * step_s
+        notes.append(
+            warning(
+                "plates",
+                f"{name} rests at the end of its range for {seconds:.2g} s in all, first "
+                f"{np.argmax(ended) * step_s:.2f} s after the start, where it reads "
+                f"{abs(force[np.argmax(ended), 2]):.0f} N: not measured there. Give it a larger range where it is "
+                "recorded.",
+            )
+        )
+        force[ended], moment[ended] = np.nan, np.nan
     z = np.cross(axis_x, axis_y)
     y = np.cross(z, axis_x)
     R_LP = np.column_stack([v / np.linalg.norm(v) for v in (axis_x, y, z)])
