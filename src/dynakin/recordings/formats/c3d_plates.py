@@ -24,8 +24,11 @@ from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, pl
 from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
-from dynakin.units import force_factor, moment_factor
+from dynakin.units import force_factor, length_factor, moment_factor
 
+_FACTORS = {"force": force_factor, "moment": moment_factor, "point": length_factor}
+_TAKEN = {"force": "N", "moment": "N times the unit of its points", "point": "the unit of its points"}
+_WORDS = {"force": "forces", "moment": "moments", "point": "centre of pressure"}
 _LASTING_PULL = 0.02
 _CENTRED_M = 0.003
 _OFFSET_WORTH_A_NOTE_N = 5.0
@@ -144,26 +147,15 @@ def _raw(
         notes.append(note("plates", f"{name} has no calibration in the file: its channels are taken as calibrated."))
     factors, known, strange = _factors(parameters, channels, unit_m, kind, calibration)
     for signal, word in strange:
-        taken = "N" if signal == "force" else "N times the unit of its points"
+        taken = _TAKEN[signal]
         notes.append(
-            warning("plates", f"{name}: unknown unit {word!r} of its {signal}s in ANALOG:UNITS, {taken} taken.")
+            warning("plates", f"{name}: unknown unit {word!r} of its {_WORDS[signal]} in ANALOG:UNITS, {taken} taken.")
         )
-    if (
-        calibration is None
-        and TYPES[kind].outputs.count("moment") == 3
-        and _at_centre(analog[channels] * factors[:, None])
-    ):
-        stays = f"the centre of pressure would stay within {1000.0 * _CENTRED_M:.0f} mm of the plate's centre"
-        if known:
-            notes.append(
-                warning(
-                    "plates",
-                    f"{name}: by the unit that the file gives for its moments {stays}: they are given in another.",
-                )
-            )
-        else:
-            factors = np.where([signal == "moment" for signal in TYPES[kind].outputs], 1.0, factors)
-            notes.append(note("plates", f"{name}: the file gives no unit for its moments: N m taken, as else {stays}."))
+    half_m = 0.5 * float(np.linalg.norm(corners[0] - corners[2]))
+    if TYPES[kind].outputs.count("moment") == 3:
+        raw = analog[channels] if calibration is None else calibration @ analog[channels]
+        factors, said = _fitting_moments(name, raw, factors, known, half_m)
+        notes += said
     origin = _origin(parameters, k, kind) * unit_m
     force, moment = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=factors)
     if (ended := at_end_of_range(analog[channels], force[:, 2])).any():
@@ -240,13 +232,31 @@ def _calibration(parameters: Parameters, k: int, kind: int) -> Array | None:
     return np.asarray(matrix[:rows, :columns])
 
 
-def _at_centre(wrench: Array) -> bool:
-    """Whether a wrench (6, N), N and N m, acts at the middle of its plate all the time: nobody stands so still."""
+def _fitting_moments(name: str, raw: Array, factors: Array, known: bool, half_m: float) -> tuple[Array, list[Message]]:
+    """Factors (6,) of a plate's raw wrench (6, N), with N m of its moments where by those given it would be pressed at
+    its middle all the time, as nobody stands, and by N m on its surface, of which half a diagonal is given; and what
+    there is to say of it. ``known``: whether the file gives the moments' unit."""
+    if _pressed_within(raw * factors[:, None]) >= _CENTRED_M:
+        return factors, []
+    stays = f"the centre of pressure would stay within {1000.0 * _CENTRED_M:.0f} mm of the plate's centre"
+    newton_metres = np.where(np.arange(6) < 3, factors, 1.0)
+    if _pressed_within(raw * newton_metres[:, None]) > half_m or (newton_metres == factors).all():
+        text = f"{name}: by the unit of its moments {stays}, which nobody does. Correct it in the file."
+        return factors, [warning("plates", text)]
+    if not known:
+        text = f"{name}: the file gives no unit for its moments: N m taken, as else {stays}."
+        return newton_metres, [note("plates", text)]
+    text = f"{name}: by the unit that the file gives for its moments {stays}: N m taken. Correct it in the file."
+    return newton_metres, [warning("plates", text)]
+
+
+def _pressed_within(wrench: Array) -> float:
+    """How far from the middle of its plate a wrench (6, N), N and N m, acts nearly all the time, m; inf where nobody
+    stands on it."""
     loaded = wrench[:, np.abs(wrench[2]) > JUDGED_N]
     if not loaded.size:
-        return False
-    away = np.hypot(loaded[3], loaded[4]) / np.abs(loaded[2])
-    return bool(np.percentile(away, 95.0) < _CENTRED_M)
+        return float("inf")
+    return float(np.percentile(np.hypot(loaded[3], loaded[4]) / np.abs(loaded[2]), 95.0))
 
 
 def _factors(
@@ -266,10 +276,10 @@ def _factors(
     words, given, strange = parameters.texts("ANALOG", "UNITS"), True, dict[tuple[str, str], None]()
     for spot, (channel, signal) in enumerate(zip(channels, outputs, strict=True)):
         word = words[channel] if channel < len(words) else ""
-        known = None if signal == "point" else force_factor(word) if signal == "force" else moment_factor(word)
+        known = _FACTORS[signal](word)
         found[spot] = found[spot] if known is None else known
         given &= signal != "moment" or known is not None
-        if word and known is None and signal != "point":
+        if word and known is None:
             strange[signal, word] = None
     return np.array(found), given, list(strange)
 

@@ -43,7 +43,7 @@ def _at_end(values: Array, loaded: Flags, same: float) -> Flags:
     if not (np.isfinite(size) and size > 0.0):
         return found
     at_top: Flags = np.asarray(values >= top - same * size)
-    flat = [(first, end) for first, end in runs(at_top) if end - first >= FLAT and 0 < first and end < len(values)]
+    flat = [(first, end) for first, end in runs(at_top) if end - first >= FLAT and first > 0 and end < len(values)]
     if not flat:
         return found
     change = np.abs(np.diff(values))
