@@ -17,7 +17,7 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import SHOE_M
 from dynakin.recordings.plates.limits import beyond_limits
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.recordings.weight import TILT_WARNING_DEG, Findings, check_steps, check_weight, likely_unit, while_loaded
@@ -259,7 +259,13 @@ def _check_pressure(
     if hidden:
         findings.say(f"{text}: it may be the {' or the '.join(hidden)} foot's, which has no markers.")
         return None
-    if away > COP_REFUSED_M:
+    push = np.abs(ground.vectors_to_ground(plate.force)[:, 1])
+    if np.nanmin(push) > UNLOADED_N and np.ptp(np.nanpercentile(nearest, (10.0, 90.0))) > COP_REFUSED_M:
+        findings.refuse(
+            f"{plate.name} reads {np.nanmedian(push):.0f} N and never nothing, wherever the feet are: zero it with "
+            "nobody on it"
+        )
+    elif away > COP_REFUSED_M:
         findings.refuse(f"{text}, expected it under the foot (at most {1000 * COP_REFUSED_M:.0f} mm)")
     else:
         findings.warn(f"{text}, expected at most {1000 * NEAR_M:.0f} mm.")

@@ -19,6 +19,7 @@ from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plate_types import TYPES, plate_wrench
 from dynakin.recordings.formats.c3d_range import at_end_of_range
+from dynakin.recordings.formats.c3d_zero import zero_frames, zeroed
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
@@ -134,6 +135,13 @@ def _raw(
     axis_x, axis_y = corners[0] - corners[1], corners[0] - corners[3]
     if not np.linalg.norm(np.cross(axis_x, axis_y)) > _LEAST_SURFACE_M2:
         raise RecordingError("its corners in the file do not span a surface")
+    z = np.cross(axis_x, axis_y)
+    y = np.cross(z, axis_x)
+    R_LP = np.column_stack([v / np.linalg.norm(v) for v in (axis_x, y, z)])
+    centre = corners.mean(axis=0)
+    normal = -R_LP[:, 2]
+    if np.isfinite(markers).any() and float(np.dot(np.nanmean(markers, axis=(0, 1)) - centre, normal)) < 0:
+        normal = -normal  # corners listed the other way round: the person's side decides what is up
     kind = int(found)
     channels = _channels(parameters, k, TYPES[kind].channels, len(analog))
     calibration = _calibration(parameters, k, kind) if TYPES[kind].calibrated else None
@@ -151,13 +159,16 @@ def _raw(
         notes.append(
             warning("plates", f"{name}: unknown unit {word!r} of its {_WORDS[signal]} in ANALOG:UNITS, {taken} taken.")
         )
+    zero = None if kind == 1 else zero_frames(parameters, len(markers))  # a mean of centres of pressure is no zero
+    signals, said = zeroed(name, analog[channels], zero, markers, corners, normal)
+    notes += said
     half_m = 0.5 * float(np.linalg.norm(corners[0] - corners[2]))
     if TYPES[kind].outputs.count("moment") == 3:
-        raw = analog[channels] if calibration is None else calibration @ analog[channels]
+        raw = signals if calibration is None else calibration @ signals
         factors, said = _fitting_moments(name, raw, factors, known, half_m)
         notes += said
     origin = _origin(parameters, k, kind) * unit_m
-    force, moment = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=factors)
+    force, moment = plate_wrench(kind, signals, origin=origin, calibration=calibration, units=factors)
     if (ended := at_end_of_range(analog[channels], force[:, 2])).any():
         seconds = np.count_nonzero(ended) * step_s
         notes.append(
@@ -170,15 +181,8 @@ def _raw(
             )
         )
         force[ended], moment[ended] = np.nan, np.nan
-    z = np.cross(axis_x, axis_y)
-    y = np.cross(z, axis_x)
-    R_LP = np.column_stack([v / np.linalg.norm(v) for v in (axis_x, y, z)])
-    centre = corners.mean(axis=0)
     force_L = force @ R_LP.T
     moment_L = moment @ R_LP.T + np.cross(centre, force_L)
-    normal = -R_LP[:, 2]
-    if np.isfinite(markers).any() and float(np.dot(np.nanmean(markers, axis=(0, 1)) - centre, normal)) < 0:
-        normal = -normal  # corners listed the other way round: the person's side decides what is up
     return _Raw(name, force_L, moment_L, Surface(centre, normal), corners), notes
 
 
