@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
 from support.made_recordings import write, write_c3d
 
 T = 20
@@ -439,25 +440,71 @@ def test_causal_reading_says_its_delay(tmp_path: Path) -> None:
         read(path, plate_filter_hz=600.0)
 
 
-@pytest.mark.parametrize(
-    ("word", "said"), [("", "no unit for its moments: N m taken"), ("Nmm", "Warning: plate 1: by the unit")]
-)
-def test_moments_in_another_unit_than_the_file_says(tmp_path: Path, word: str, said: str) -> None:
-    """A person 0.2 m beside the middle of a plate, whose moments are in N m."""
+def stands_aside(path: Path, kind: int, word: str, factor: float, aside_m: float = 0.2) -> Recording:
+    """A person some 0.2 m beside the middle of a plate of this type, whose channels or calibration give moments in N m
+    times a factor, and the unit ``word``."""
     t = np.arange(1000) / 1000.0
     push = -600.0 - 50.0 * np.sin(2.0 * np.pi * 2.0 * t)
-    channels = np.stack([0.0 * t, 0.0 * t, push, 0.05 * push, -0.2 * push, 0.0 * t])
+    channels = np.stack([0.0 * t, 0.0 * t, push, 0.25 * aside_m * push, -aside_m * push, 0.0 * t])
+    channels[3:] *= factor
     corners = np.array([[300.0, 300, 0], [-300, 300, 0], [-300, -300, 0], [300, -300, 0]])
+    return read(
+        write_c3d(
+            path,
+            {"LASI": np.full((100, 3), 900.0)},
+            kinds=[kind],
+            channels=channels if kind == 2 else 0.01 * channels,
+            corners=[corners],
+            origins=[[0.0, 0.0, -40.0]],
+            calibration=None if kind == 2 else 100.0 * np.eye(6)[:, :, None],
+            analog_units=(["N"] * 3 if kind == 2 else ["V"] * 3) + [word] * 3,
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "word", "factor", "said"),
+    [
+        (2, "", 1.0, "no unit for its moments: N m taken"),
+        (2, "Nmm", 1.0, "Warning: plate 1: by the unit that the file gives for its moments"),
+        (4, "V", 1.0, "no unit for its moments: N m taken"),  # a calibration in N m/V
+        (4, "V", 1000.0, ""),
+        (2, "Nmm", 1000.0, ""),
+        (2, "Nm", 0.001, "Warning: plate 1: by the unit of its moments"),
+    ],
+)
+def test_moments_in_another_unit_than_the_file_says(
+    tmp_path: Path, kind: int, word: str, factor: float, said: str
+) -> None:
+    recording = stands_aside(tmp_path / "a.c3d", kind, word, factor)
+    about = [note for note in map(str, recording.notes) if "moments" in note]
+    assert [said in note for note in about] == [True] * bool(said)
+    away = np.abs(np.nanmedian(recording.plates[0].cop, axis=0)).max()
+    assert away == pytest.approx(0.2 if factor != 0.001 else 0.0, abs=0.01)
+
+
+def test_a_weight_at_the_middle_of_a_plate_is_no_other_unit(tmp_path: Path) -> None:
+    """In N m it would lie beyond the edges."""
+    recording = stands_aside(tmp_path / "a.c3d", 2, "Nmm", 1000.0, aside_m=0.002)
+    assert np.abs(np.nanmedian(recording.plates[0].cop, axis=0)).max() < 0.003
+
+
+@pytest.mark.parametrize(("word", "unit_m"), [("m", 1.0), ("cm", 0.01), ("mm", 0.001), ("", 0.001), ("furlong", 0.001)])
+def test_type_1_has_its_centre_of_pressure_in_the_unit_that_the_file_gives(
+    tmp_path: Path, word: str, unit_m: float
+) -> None:
+    channels = channels_of(1)
+    channels[3:5] *= 1e-3 / unit_m
     path = write_c3d(
         tmp_path / "a.c3d",
-        {"LASI": np.full((100, 3), 900.0)},
-        kinds=[2],
+        body(),
+        kinds=[1],
         channels=channels,
-        corners=[corners],
-        origins=[[0.0, 0.0, -40.0]],
-        analog_units=["N"] * 3 + [word] * 3,
+        corners=[turned(R_LP)],
+        origins=[[0.0, 0.0, 0.0]],
+        analog_units=["N"] * 3 + [word] * 2 + ["Nmm"],
     )
     recording = read(path)
-    assert any(said in note for note in map(str, recording.notes))
-    away = np.abs(np.nanmedian(recording.plates[0].cop, axis=0)).max()
-    assert away == pytest.approx(0.2, abs=0.01) if not word else away < 0.003
+    np.testing.assert_allclose(recording.total_wrench()[5], expected_wrench(R_LP), rtol=1e-4, atol=2e-2)
+    said = [note for note in map(str, recording.notes) if "unknown unit 'furlong' of its centre of pressure" in note]
+    assert bool(said) == (word == "furlong")

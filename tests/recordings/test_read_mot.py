@@ -202,7 +202,8 @@ def test_longer_table_at_the_same_rate_is_cut_exactly(tmp_path: Path) -> None:
     [
         (np.arange(50) / 100, "do not cover"),
         (np.arange(50) / 1000, "do not cover"),
-        (0.5 + np.arange(200) / 100, "do not cover"),
+        (0.55 + np.arange(200) / 100, "do not cover"),
+        (10.0 + np.arange(200) / 100, "do not cover"),
         (np.arange(51) / 50, "sampled more slowly"),
     ],
 )
@@ -213,6 +214,29 @@ def test_forces_that_do_not_fit_name_both_lengths_and_ranges(tmp_path: Path, tim
     assert what in message
     assert f"{len(time)} rows from {time[0]:g} s to {time[-1]:g} s" in message
     assert "101 frames from 0 s to 1 s" in message
+
+
+@pytest.mark.parametrize(
+    ("time", "missing", "level"),
+    [
+        (np.arange(100) / 100, slice(100, 101), "note"),  # a row short
+        (np.arange(1001) / 1000 + 0.05, slice(0, 5), "note"),
+        (np.arange(70) / 100, slice(70, 101), "warning"),
+        (np.arange(95) / 100 + 0.03, [0, 1, 2, 98, 99, 100], "note"),
+    ],
+)
+def test_frames_beyond_the_rows_of_the_forces_are_not_measured(
+    tmp_path: Path, time: np.ndarray, missing: slice | list[int], level: str
+) -> None:
+    recording = read(trc(tmp_path, 101), write(tmp_path, "a.mot", single(time)))
+    unknown = np.zeros(101, dtype=bool)
+    unknown[missing] = True
+    (plate,) = recording.plates
+    for values in (plate.force, plate.moment, plate.cop, plate.free_moment):
+        np.testing.assert_array_equal(np.isnan(values).all(axis=1), unknown)
+    np.testing.assert_allclose(plate.force[~unknown], np.tile([10.0, 700.0, -20.0], (np.sum(~unknown), 1)), atol=1e-6)
+    (said,) = [note for note in recording.notes if "has forces from" in note.text]
+    assert said.level == level and f"in {unknown.sum()} of 101 frames the plates are not measured" in said.text
 
 
 def test_table_without_forces_and_plate_without_point(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import SHOE_M
 from dynakin.recordings.plates.limits import beyond_limits
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.recordings.weight import TILT_WARNING_DEG, Findings, check_steps, check_weight, likely_unit, while_loaded
@@ -37,6 +37,9 @@ OVER_EDGE_M = 0.01
 trials that we have of which 11 kg are missing it is 18 and 27 mm, in the four that show the weight 0."""
 FREE_MOMENT_WARNING_M = 0.05
 """Free moment over vertical force: two feet twisting on the ground rarely exceed 10 N m at 400 N."""
+LYING_N, LYING = (200.0, 4000.0), 0.25
+"""Forces of so much on average while they are loaded, as people weigh (more is a unit or scale), and a vertical one of
+less than this part of it: friction allows no more across than 1.5 times the vertical."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,8 @@ def check_plates(
     frames = standing if standing is not None else slice(None)
     places = _feet(recording, ground, foot_markers or {}, findings)
     feet = {foot: place[:, :, [0, 2]] for foot, place in places.items()}
+    if lying := _lying(recording, ground):
+        return PlateCheck(None, None, tuple(findings.messages), lying)
     if mass_kg is None and (idle := _idle(recording, ground, feet, steps_kg)):
         findings.messages.append(idle)
         return PlateCheck(None, None, tuple(findings.messages), None, unused=idle.level == "warning")
@@ -135,6 +140,23 @@ def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame
     return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
 
 
+def _lying(recording: Recording, ground: GroundFrame) -> str | None:
+    """A sentence on forces that are large, and all across the vertical: they have other axes than the markers."""
+    total = np.nan_to_num(np.sum([plate.force for plate in recording.plates], axis=0))
+    size = np.linalg.norm(total, axis=1)
+    mean = total[size > 0.5 * size.max()].mean(axis=0) if size.max() > LYING_N[0] else np.zeros(3)
+    k = int(np.argmax(np.abs(mean)))
+    if not LYING_N[0] < np.abs(mean[k]) < LYING_N[1] or np.abs(ground.vectors_to_ground(mean)[1]) > LYING * np.abs(
+        mean[k]
+    ):
+        return None
+    axis = f"{'+' if mean[k] > 0.0 else '-'}{'XYZ'[k]}"
+    return (
+        f"the forces lie along {axis} ({abs(mean[k]):.0f} N on average while loaded), vertical is {ground.vertical}: "
+        "give the forces in the axes of the markers"
+    )
+
+
 def _idle(
     recording: Recording, ground: GroundFrame, feet: Mapping[str, Array], steps_kg: float | None
 ) -> Message | None:
@@ -146,13 +168,20 @@ def _idle(
         return None
     if len(feet) > 1 and all(_beside(plate, ground, feet) for plate in recording.plates):
         return note("plates", "Nobody steps on the plates: they carry nothing, and no foot is on any.")
+    known = np.all([np.isfinite(plate.force).all(axis=1) for plate in recording.plates], axis=0)
+    without = "it is run as one without plates, and the ground reaction follows from the motion"
+    if not known.all():
+        return warning(
+            "plates",
+            f"the plates carry nobody in the {np.count_nonzero(known)} of {len(known)} frames in which they are "
+            f"measured (they read {most:.1f} N at most): {without}.",
+        )
     unit = likely_unit(while_loaded(np.sum(pushes, axis=0)), steps_kg)
     perhaps = f", and whether they are in {unit}, not N" if unit else ""
     return warning(
         "plates",
-        f"the plates carry nobody in this recording (they read {most:.1f} N at most): it is run as one "
-        "without plates, and the ground reaction follows from the motion. If somebody steps on them, look whether "
-        f"their channels were connected{perhaps}.",
+        f"the plates carry nobody in this recording (they read {most:.1f} N at most): {without}. If somebody steps on "
+        f"them, look whether their channels were connected{perhaps}.",
     )
 
 
@@ -252,7 +281,13 @@ def _check_pressure(
     if hidden:
         findings.say(f"{text}: it may be the {' or the '.join(hidden)} foot's, which has no markers.")
         return None
-    if away > COP_REFUSED_M:
+    push = np.abs(ground.vectors_to_ground(plate.force)[:, 1])
+    if np.nanmin(push) > UNLOADED_N and np.ptp(np.nanpercentile(nearest, (10.0, 90.0))) > COP_REFUSED_M:
+        findings.refuse(
+            f"{plate.name} reads {np.nanmedian(push):.0f} N and never nothing, wherever the feet are: zero it with "
+            "nobody on it"
+        )
+    elif away > COP_REFUSED_M:
         findings.refuse(f"{text}, expected it under the foot (at most {1000 * COP_REFUSED_M:.0f} mm)")
     else:
         findings.warn(f"{text}, expected at most {1000 * NEAR_M:.0f} mm.")

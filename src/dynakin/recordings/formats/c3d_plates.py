@@ -18,13 +18,18 @@ from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plate_types import TYPES, plate_wrench
+from dynakin.recordings.formats.c3d_range import at_end_of_range
+from dynakin.recordings.formats.c3d_zero import zero_frames, zeroed
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
-from dynakin.units import force_factor, moment_factor
+from dynakin.units import force_factor, length_factor, moment_factor
 
+_FACTORS = {"force": force_factor, "moment": moment_factor, "point": length_factor}
+_TAKEN = {"force": "N", "moment": "N times the unit of its points", "point": "the unit of its points"}
+_WORDS = {"force": "forces", "moment": "moments", "point": "centre of pressure"}
 _LASTING_PULL = 0.02
 _CENTRED_M = 0.003
 _OFFSET_WORTH_A_NOTE_N = 5.0
@@ -86,7 +91,7 @@ def read_plates(
     for k in range(int(used)):
         name = f"plate {k + 1}"
         try:
-            raw, said = _raw(name, parameters, k, analog, markers, unit_m)
+            raw, said = _raw(name, parameters, k, analog, step, markers, unit_m)
             check_wrench(name, analog_time, raw.force, raw.moment, "")
         except RecordingError as error:
             why = str(error).removeprefix(": ").removeprefix(f"{name} ")
@@ -115,9 +120,9 @@ def read_plates(
 
 
 def _raw(
-    name: str, parameters: Parameters, k: int, analog: Array, markers: Array, unit_m: float
+    name: str, parameters: Parameters, k: int, analog: Array, step_s: float, markers: Array, unit_m: float
 ) -> tuple[_Raw, list[Message]]:
-    """Plate k, and notes.
+    """Plate k, and notes; step_s: between samples.
 
     Raises:
         RecordingError: why it cannot be read.
@@ -130,6 +135,13 @@ def _raw(
     axis_x, axis_y = corners[0] - corners[1], corners[0] - corners[3]
     if not np.linalg.norm(np.cross(axis_x, axis_y)) > _LEAST_SURFACE_M2:
         raise RecordingError("its corners in the file do not span a surface")
+    z = np.cross(axis_x, axis_y)
+    y = np.cross(z, axis_x)
+    R_LP = np.column_stack([v / np.linalg.norm(v) for v in (axis_x, y, z)])
+    centre = corners.mean(axis=0)
+    normal = -R_LP[:, 2]
+    if np.isfinite(markers).any() and float(np.dot(np.nanmean(markers, axis=(0, 1)) - centre, normal)) < 0:
+        normal = -normal  # corners listed the other way round: the person's side decides what is up
     kind = int(found)
     channels = _channels(parameters, k, TYPES[kind].channels, len(analog))
     calibration = _calibration(parameters, k, kind) if TYPES[kind].calibrated else None
@@ -143,37 +155,34 @@ def _raw(
         notes.append(note("plates", f"{name} has no calibration in the file: its channels are taken as calibrated."))
     factors, known, strange = _factors(parameters, channels, unit_m, kind, calibration)
     for signal, word in strange:
-        taken = "N" if signal == "force" else "N times the unit of its points"
+        taken = _TAKEN[signal]
         notes.append(
-            warning("plates", f"{name}: unknown unit {word!r} of its {signal}s in ANALOG:UNITS, {taken} taken.")
+            warning("plates", f"{name}: unknown unit {word!r} of its {_WORDS[signal]} in ANALOG:UNITS, {taken} taken.")
         )
-    if (
-        calibration is None
-        and TYPES[kind].outputs.count("moment") == 3
-        and _at_centre(analog[channels] * factors[:, None])
-    ):
-        stays = f"the centre of pressure would stay within {1000.0 * _CENTRED_M:.0f} mm of the plate's centre"
-        if known:
-            notes.append(
-                warning(
-                    "plates",
-                    f"{name}: by the unit that the file gives for its moments {stays}: they are given in another.",
-                )
-            )
-        else:
-            factors = np.where([signal == "moment" for signal in TYPES[kind].outputs], 1.0, factors)
-            notes.append(note("plates", f"{name}: the file gives no unit for its moments: N m taken, as else {stays}."))
+    zero = None if kind == 1 else zero_frames(parameters, len(markers))  # a mean of centres of pressure is no zero
+    signals, said = zeroed(name, analog[channels], zero, markers, corners, normal)
+    notes += said
+    half_m = 0.5 * float(np.linalg.norm(corners[0] - corners[2]))
+    if TYPES[kind].outputs.count("moment") == 3:
+        raw = signals if calibration is None else calibration @ signals
+        factors, said = _fitting_moments(name, raw, factors, known, half_m)
+        notes += said
     origin = _origin(parameters, k, kind) * unit_m
-    force, moment = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=factors)
-    z = np.cross(axis_x, axis_y)
-    y = np.cross(z, axis_x)
-    R_LP = np.column_stack([v / np.linalg.norm(v) for v in (axis_x, y, z)])
-    centre = corners.mean(axis=0)
+    force, moment = plate_wrench(kind, signals, origin=origin, calibration=calibration, units=factors)
+    if (ended := at_end_of_range(analog[channels], force[:, 2])).any():
+        seconds = np.count_nonzero(ended) * step_s
+        notes.append(
+            warning(
+                "plates",
+                f"{name} rests at the end of its range for {seconds:.2g} s in all, first "
+                f"{np.argmax(ended) * step_s:.2f} s after the start, where it reads "
+                f"{abs(force[np.argmax(ended), 2]):.0f} N: not measured there. Give it a larger range where it is "
+                "recorded.",
+            )
+        )
+        force[ended], moment[ended] = np.nan, np.nan
     force_L = force @ R_LP.T
     moment_L = moment @ R_LP.T + np.cross(centre, force_L)
-    normal = -R_LP[:, 2]
-    if np.isfinite(markers).any() and float(np.dot(np.nanmean(markers, axis=(0, 1)) - centre, normal)) < 0:
-        normal = -normal  # corners listed the other way round: the person's side decides what is up
     return _Raw(name, force_L, moment_L, Surface(centre, normal), corners), notes
 
 
@@ -227,13 +236,31 @@ def _calibration(parameters: Parameters, k: int, kind: int) -> Array | None:
     return np.asarray(matrix[:rows, :columns])
 
 
-def _at_centre(wrench: Array) -> bool:
-    """Whether a wrench (6, N), N and N m, acts at the middle of its plate all the time: nobody stands so still."""
+def _fitting_moments(name: str, raw: Array, factors: Array, known: bool, half_m: float) -> tuple[Array, list[Message]]:
+    """Factors (6,) of a plate's raw wrench (6, N), with N m of its moments where by those given it would be pressed at
+    its middle all the time, as nobody stands, and by N m on its surface, of which half a diagonal is given; and what
+    there is to say of it. ``known``: whether the file gives the moments' unit."""
+    if _pressed_within(raw * factors[:, None]) >= _CENTRED_M:
+        return factors, []
+    stays = f"the centre of pressure would stay within {1000.0 * _CENTRED_M:.0f} mm of the plate's centre"
+    newton_metres = np.where(np.arange(6) < 3, factors, 1.0)
+    if _pressed_within(raw * newton_metres[:, None]) > half_m or (newton_metres == factors).all():
+        text = f"{name}: by the unit of its moments {stays}, which nobody does. Correct it in the file."
+        return factors, [warning("plates", text)]
+    if not known:
+        text = f"{name}: the file gives no unit for its moments: N m taken, as else {stays}."
+        return newton_metres, [note("plates", text)]
+    text = f"{name}: by the unit that the file gives for its moments {stays}: N m taken. Correct it in the file."
+    return newton_metres, [warning("plates", text)]
+
+
+def _pressed_within(wrench: Array) -> float:
+    """How far from the middle of its plate a wrench (6, N), N and N m, acts nearly all the time, m; inf where nobody
+    stands on it."""
     loaded = wrench[:, np.abs(wrench[2]) > JUDGED_N]
     if not loaded.size:
-        return False
-    away = np.hypot(loaded[3], loaded[4]) / np.abs(loaded[2])
-    return bool(np.percentile(away, 95.0) < _CENTRED_M)
+        return float("inf")
+    return float(np.percentile(np.hypot(loaded[3], loaded[4]) / np.abs(loaded[2]), 95.0))
 
 
 def _factors(
@@ -253,10 +280,10 @@ def _factors(
     words, given, strange = parameters.texts("ANALOG", "UNITS"), True, dict[tuple[str, str], None]()
     for spot, (channel, signal) in enumerate(zip(channels, outputs, strict=True)):
         word = words[channel] if channel < len(words) else ""
-        known = None if signal == "point" else force_factor(word) if signal == "force" else moment_factor(word)
+        known = _FACTORS[signal](word)
         found[spot] = found[spot] if known is None else known
         given &= signal != "moment" or known is not None
-        if word and known is None and signal != "point":
+        if word and known is None:
             strange[signal, word] = None
     return np.array(found), given, list(strange)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from dynakin.errors import RecordingError
-from dynakin.messages import Message, note
+from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, parse_column
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.formats.time_stamps import settled_times
@@ -18,7 +19,12 @@ from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.resampling import ReadOptions, low_pass, resample, same_times
 from dynakin.recordings.times import rate_of, step_of
 
+Flags = npt.NDArray[np.bool_]
+
 _MIN_RATE_RATIO = 0.99
+_LEAST_COVER, _END_S = 0.5, 0.1
+"""A table of less than this part of the frames is another trial's. An export that ends some rows before the markers do
+needs nothing done; more is warned of."""
 
 
 def plates_from_table(table: Table) -> tuple[tuple[Plate, ...], tuple[Message, ...]]:
@@ -108,9 +114,11 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
     at a higher rate that covers the markers is resampled: the wrench about the laboratory origin, not the
     centre of pressure, which jumps at each contact.
 
+    Frames beyond its rows are not measured (NaN).
+
     Raises:
-        RecordingError: the table is shorter than the markers or sampled more slowly; the message names both
-            lengths and ranges.
+        RecordingError: the table has rows for less than half of the markers' frames, or is sampled more slowly; the
+            message names both lengths and ranges.
     """
     columns = [k for k, name in enumerate(table.names) if parse_column(name)]
     time, stamps = settled_times(table.time, table.values[:, columns])
@@ -121,8 +129,10 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         text = f"{table.path.name} replaces the {len(recording.plates)} plates of {recording.name}."
         notes += (note("recording", text),)
     untouched = same_times(table.time, recording.time)
+    covered: Flags = np.ones(recording.n_frames, dtype=bool)
     if not untouched:
-        _check_cover(recording, table)
+        covered = _covered(recording, table)
+        notes += _uncovered_in_words(recording, table, covered)
         first, last = table.time[0], table.time[-1]
         text = (
             f"{table.path.name}: {len(table.time)} rows from {first:g} s to {last:g} s brought to the "
@@ -131,24 +141,58 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         notes += (note("routine", text),)
     if untouched and options.plate_filter_hz is None and options.force_threshold_n is None:
         return recording.with_plates(plates, notes)
-    return recording.with_plates(tuple(_resampled(plate, table, recording, options) for plate in plates), notes)
+    time = recording.time[covered]
+    found = [_beyond_rows(_resampled(plate, table, time, options), covered) for plate in plates]
+    return recording.with_plates(tuple(found), notes)
 
 
-def _check_cover(recording: Recording, table: Table) -> None:
+def _covered(recording: Recording, table: Table) -> Flags:
+    """(T,) frames of the recording for which the table has rows."""
     t, m = table.time, recording.time
     step = step_of(m) if len(m) > 1 else 0.0
     rate = rate_of(t) if len(t) > 1 else 0.0
     slow = len(m) > 1 and rate < _MIN_RATE_RATIO * recording.rate
-    if slow or t[0] > m[0] + 0.5 * step or t[-1] < m[-1] - 0.5 * step:
+    covered: Flags = np.asarray((m >= t[0] - 0.5 * step) & (m <= t[-1] + 0.5 * step))
+    if slow or covered.mean() < _LEAST_COVER:
         what = "are sampled more slowly than" if slow else "do not cover"
         raise RecordingError(
             f"{table.path}: forces {what} the markers: "
             f"{len(t)} rows from {t[0]:g} s to {t[-1]:g} s at {rate:.4g} Hz, "
             f"expected to cover {len(m)} frames from {m[0]:g} s to {m[-1]:g} s at {recording.rate:.4g} Hz"
         )
+    return covered
 
 
-def _resampled(plate: Plate, table: Table, recording: Recording, options: ReadOptions) -> Plate:
+def _uncovered_in_words(recording: Recording, table: Table, covered: Flags) -> tuple[Message, ...]:
+    """What there is to say of frames without rows: a warning where they are many."""
+    if covered.all():
+        return ()
+    text = (
+        f"{table.path.name} has forces from {table.time[0]:g} s to {table.time[-1]:g} s, markers go from "
+        f"{recording.time[0]:g} s to {recording.time[-1]:g} s: in {np.count_nonzero(~covered)} of {len(covered)} "
+        "frames the plates are not measured."
+    )
+    if np.count_nonzero(~covered) <= _END_S * recording.rate:
+        return (note("recording", text),)
+    return (warning("plates", f"{text} Export the forces of the whole trial."),)
+
+
+def _beyond_rows(plate: Plate, covered: Flags) -> Plate:
+    """A plate of the covered frames, for all (T,): NaN in the others."""
+    if covered.all():
+        return plate
+
+    def of(values: Array) -> Array:
+        every = np.full((len(covered), 3), np.nan)
+        every[covered] = values
+        return every
+
+    values = (plate.force, plate.moment, plate.cop, plate.free_moment)
+    force, moment, cop, free = map(of, values)
+    return replace(plate, force=force, moment=moment, cop=cop, free_moment=free)
+
+
+def _resampled(plate: Plate, table: Table, time: Array, options: ReadOptions) -> Plate:
     wrench = np.hstack([plate.force, plate.moment])
     for row in np.flatnonzero(np.isnan(wrench).any(axis=1))[:1]:
         raise RecordingError(
@@ -157,12 +201,12 @@ def _resampled(plate: Plate, table: Table, recording: Recording, options: ReadOp
     if options.plate_filter_hz is not None:
         rate = rate_of(table.time)
         wrench = low_pass(wrench, rate, options.plate_filter_hz, causal=options.causal)
-    wrench = resample(wrench, table.time, recording.time, causal=options.causal)
+    wrench = resample(wrench, table.time, time, causal=options.causal)
     threshold = UNLOADED_N if options.force_threshold_n is None else options.force_threshold_n
     surface = _surface(plate)
     if surface is None:  # never loaded
         wrench[np.linalg.norm(wrench[:, :3], axis=1) < threshold] = 0.0
-        idle = plate.frames(np.zeros(recording.n_frames, dtype=int))
+        idle = plate.frames(np.zeros(len(time), dtype=int))
         return replace(idle, force=wrench[:, :3], moment=wrench[:, 3:])
     return plate_from_wrench(
         plate.name,
