@@ -138,7 +138,11 @@ class LandmarkFinder:
         ways: list[frozenset[str]] = []
         for recipe in self._recipes[name]:
             own = [frozenset[str]()]
+            back = recipe.pelvis.psis if recipe.pelvis is not None else ""
             for source in recipe.inputs:
+                if source == back:  # of either side
+                    own = [a | b for a in own for s in SIDES for b in self.lacking(source, s)]
+                    continue
                 for s in SIDES if source in recipe.across else _sides(recipe, side):
                     own = [a | b for a in own for b in self.lacking(source, s)]
             ways += own

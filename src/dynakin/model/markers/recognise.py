@@ -40,6 +40,7 @@ CORRECT = "correct the labels"
 _ON_LEG_AT_LEAST = 2  # segments of one leg
 _ROOT = "pelvis"
 _ABOUT_AS_MANY = 0.9  # of the markers that the first set explains
+_FAR_FEWER = 0.5  # than another set knows: `plug-in-gait` of OpenCap's markers has 6 of 27
 _IMPOSSIBLE = 4.5  # deviations of a distance beyond which it is none of a body (2.9 at most in shared/data)
 _FEW_WRONG, _MANY_WRONG = 2, 0.25
 _HALF, _START_S = 0.5, 0.2
@@ -134,8 +135,8 @@ def _usable(ranked: Sequence[Fit], where: str) -> list[Fit]:
         if best.worn and not best.lacking:
             knee = next(name for (place, _), name in best.names.items() if place == "KJ")
             raise ModelError(
-                f"{where}: {knee} is a joint centre in {best.marker_set.name}, but here are markers on the pelvis' skin, "
-                "expected a set of your own that says what is on the skin: dynakin markers new TRIAL -o my.toml"
+                f"{where}: {knee} is a joint centre in {best.marker_set.name}, but here are markers on the pelvis' "
+                "skin; expected a set of your own that says what is on the skin: dynakin markers new TRIAL -o my.toml"
             )
         why = f"best: {best.marker_set.name} with {best.explained_n} markers; it lacks {'; '.join(best.lacking)}"
         raise ModelError(
@@ -143,6 +144,29 @@ def _usable(ranked: Sequence[Fit], where: str) -> list[Fit]:
             "names of a set of `dynakin markers list`, or a set of your own: dynakin markers new TRIAL -o my.toml"
         )
     return found
+
+
+def refuse_unfit(asked: MarkerSetFile, recording: Recording) -> None:
+    """Refuse a built-in set that knows far fewer markers of pelvis and legs than another, as one named by mistake.
+
+    Raises:
+        ModelError: names both, and how many markers each knows.
+    """
+    if asked.name not in available_marker_sets() or asked != load_marker_set(asked.name):
+        return  # one of the user's own knows what it wants
+    ranked = fits(recording.seen_names)
+    best = next((fit for fit in ranked if not fit.lacking and not fit.worn), None)
+    names, _ = found_markers(asked, Spellings.of(recording.seen_names))
+    if best is not None and _on_legs(asked, names) < _FAR_FEWER * _on_legs(best.marker_set, best.names):
+        raise ModelError(
+            f"{recording.path or recording.name}: {asked.name} knows {len(names)} of the {len(recording.seen_names)} "
+            f"markers, {best.marker_set.name} knows {best.explained_n}; expected --markers {best.marker_set.name}, or "
+            "no --markers"
+        )
+
+
+def _on_legs(marker_set: MarkerSetFile, names: Mapping[MarkerKey, str]) -> int:
+    return sum(_segment(marker_set, name) in (_ROOT, *LEG) for name, _ in names)
 
 
 @dataclass(frozen=True)

@@ -62,8 +62,8 @@ _FRENCH = ("cuisse", "jambe", "pied")
 # Segments whose clusters are named after them, longest word first.
 _SEGMENTS = {
     "thigh": ("oberschenkel", "upperleg", "thigh", "femur", "cuisse", "muslo", "coscia", "uleg", "tgh", "thi", "th"),
-    "shank": ("unterschenkel", "lowerleg", "shank", "tibia", "jambe", "gamba", "calf", "shin", "lleg", "leg", "tib", "sha",
-              "shk", "sk", "sh"),
+    "shank": ("unterschenkel", "lowerleg", "shank", "tibia", "jambe", "gamba", "calf", "shin", "lleg", "leg", "tib",
+              "sha", "shk", "sk", "sh"),
     "foot": ("midfoot", "foot", "fuss", "pied"),
     "pelvis": ("pelvis", "becken", "bassin", "pelv", "pel"),
     "upper_arm": ("upperarm", "oberarm", "humerus", "deltoid", "triceps", "biceps", "bicep", "uparm", "uarm",
