@@ -20,8 +20,8 @@ from dynakin.validation.case import Case
 
 _LISTED, _SETS = 6, 3
 _MARKER_S, _PLANAR_FRAME_S = 0.25e-3, 1.5e-3
-"""Processor time that a frame of a run takes, all passes, files and the report: of a whole body by the marker (73: 18 ms
-in 12 s at 250 Hz), and in the plane."""
+"""Processor time that a frame of a run takes, all passes, files and the report: of a whole body by the marker (73:
+18 ms, in 12 s at 250 Hz), and in the plane."""
 
 
 _SOME_KG = 70.0
