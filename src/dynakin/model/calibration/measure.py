@@ -39,6 +39,7 @@ from dynakin.model.table import BodyTable
 from dynakin.recordings.companions import another_person
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.landmarks import plain_name
+from dynakin.recordings.orientation import against_vertical
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.results.naming import listed, words
@@ -139,7 +140,13 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     found, unmarked = _landmarks(asked, marked, still, messages)
     mass_kg, height_m = _mass_and_height(asked, marked, still, messages)
     messages += found.messages
-    check_body_mass(subject, mass_kg, height_m)
+    try:
+        check_body_mass(subject, mass_kg, height_m)
+    except ModelError as error:
+        ground = trials.trial.ground
+        other, _ = against_vertical(asked.recording, ground.vertical, trials.trial.match.facing_pairs)
+        why = f"; vertical is {ground.vertical}, but the markers show {other}" if other else ""
+        raise ModelError(f"{error.message}{why}") from None
     if subject.sex is None:
         messages.append(
             note(

@@ -40,7 +40,8 @@ _KINDS = (
     _Kind(
         "Model scaling",
         ("scaling",),
-        "Scale the model to the person again, by a standing trial, or run without --model: fullbody measures its own.",
+        "Unlock in the model's file what is held still and moves, else scale the model to the person again, by a "
+        "standing trial, or run without --model: fullbody measures its own.",
     ),
     _Kind(
         "Identified parameters",
