@@ -65,7 +65,7 @@ def test_a_file_has_a_plain_line_now_and_then(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     clock = iter([0.0, 0.0, 10.0, 40.0, 50.0, 71.0])
-    monkeypatch.setattr(progress.time, "monotonic", lambda: next(clock))
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: next(clock)))
     with stage("estimating") as report:
         for done in (10, 40, 50, 71):
             report(done, 100)

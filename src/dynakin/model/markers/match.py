@@ -8,8 +8,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from dynakin.errors import ModelError
-from dynakin.model.markers.draft.by_name import SIDE_WORDS
 from dynakin.model.markers.schema import Marker, MarkerSetFile
+from dynakin.model.markers.side_words import SIDE_WORDS
 from dynakin.recordings.landmarks import FacingPairs, plain_name
 
 MarkerKey = tuple[str, str]

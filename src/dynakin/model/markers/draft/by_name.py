@@ -14,50 +14,13 @@ from typing import Any, Literal
 from dynakin.errors import ModelError
 from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.side_words import LONG_SIDE_WORDS, SHORT_SIDE_WORDS
 from dynakin.recordings.landmarks import plain_name
 from dynakin.settings.strict import read_toml
 
 Sure = Literal["sure", "likely", "unsure"]
 
 _FILE = resources.files("dynakin.model") / "markers" / "draft" / "places.toml"
-_WORDS = {
-    "right": (
-        "right",
-        "rechts",
-        "derecha",
-        "derecho",
-        "rechter",
-        "direita",
-        "direito",
-        "droite",
-        "droit",
-        "destro",
-        "destra",
-        "rt",
-        "dx",
-        "r",
-    ),
-    "left": (
-        "left",
-        "links",
-        "izquierda",
-        "izquierdo",
-        "linker",
-        "esquerda",
-        "esquerdo",
-        "gauche",
-        "sinistro",
-        "sinistra",
-        "lt",
-        "sx",
-        "l",
-    ),
-}
-_SHORT_WORDS = {"right": ("re", "d"), "left": ("li", "g")}
-"""German and French: only where nothing else says the side, and a letter only behind a place or a French segment: d
-elsewhere counts the markers of a cluster."""
-SIDE_WORDS = frozenset(word for words in (_WORDS, _SHORT_WORDS) for own in words.values() for word in own)
-"""Words for right and left in all languages that names are read in."""
 _FRENCH = ("cuisse", "jambe", "pied")
 # Segments whose clusters are named after them, longest word first.
 _SEGMENTS = {
@@ -185,12 +148,12 @@ def _readings(name: str) -> list[tuple[str | None, str]]:
     last = "".join(c for c in letters if not unicodedata.combining(c))  # Knöchel, malléole
     tokens = [t.casefold() for t in re.findall(r"[^\W\d_]?[a-z]+|[A-Z]+(?![a-z])|\d+", last)]
     found: list[tuple[str | None, str]] = []
-    for side, words in _WORDS.items():
+    for side, words in LONG_SIDE_WORDS.items():
         for k in (0, len(tokens) - 1, *range(1, len(tokens) - 1)):
             if len(tokens) > 1 and tokens[k] in words:
                 found.append((side, "".join(tokens[:k] + tokens[k + 1 :])))
     whole = "".join(tokens)
-    for side, words in _WORDS.items():
+    for side, words in LONG_SIDE_WORDS.items():
         for word in words:
             if len(word) > 2 and whole.startswith(word) and len(whole) > len(word):
                 found.append((side, whole[len(word) :]))
@@ -199,7 +162,7 @@ def _readings(name: str) -> list[tuple[str | None, str]]:
     for side in ("right", "left"):
         if len(whole) > 1 and whole[0] == side[0]:
             found.append((side, whole[1:]))
-    for side, words in _SHORT_WORDS.items():
+    for side, words in SHORT_SIDE_WORDS.items():
         for k in {0, len(tokens) - 1}:
             rest = "".join(tokens[:k] + tokens[k + 1 :])
             if len(tokens) > 1 and tokens[k] in words and (len(tokens[k]) > 1 or rest in _FRENCH or _place(rest)):
