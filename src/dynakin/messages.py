@@ -28,6 +28,7 @@ Topic = Literal[
     "labels",  # markers that are not where their names say
     "guessed",  # markers whose places no name says
     "joints",  # joints that no marker shows
+    "held",  # knees held between a pelvis and a foot that are seen
     "mass",  # where the mass comes from
     "height",
     "physique",  # a person unlike those of the inertia tables

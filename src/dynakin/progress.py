@@ -4,8 +4,8 @@
         for done, figure in enumerate(figures):
             report(done, len(figures))
 
-Whoever takes long opens a stage; whether and where it is seen is decided here alone. Nothing is shown where nobody
-looks: a file, a pipe, a worker (`silent`).
+Whoever takes long opens a stage; whether and where it is seen is decided here alone. A file or a pipe has a plain line
+of stderr every 30 s, so that nobody takes a long run for one that hangs; a worker (`silent`) shows nothing.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ Progress = Callable[[int, int], None]
 """Called with (done, in all) now and then."""
 
 _EVERY_S = 0.5  # between two lines of a notebook
+_PIPED_S = 30.0  # between two lines of a file or a pipe, and before the first
 
 
 class _Screen(Protocol):
@@ -67,7 +68,9 @@ def silent() -> Iterator[None]:
 def _new_screen() -> _Screen:
     if _in_notebook():
         return _Notebook()
-    return _Terminal() if sys.stderr is not None and sys.stderr.isatty() else _Nobody()
+    if sys.stderr is None:
+        return _Nobody()
+    return _Terminal() if sys.stderr.isatty() else _Piped()
 
 
 def _in_notebook() -> bool:
@@ -116,6 +119,28 @@ class _Terminal:
         self._bars.remove_task(self._id(stage))
         if not self._bars.tasks:
             self._bars.stop()
+
+
+class _Piped:
+    """A line of stderr now and then."""
+
+    def __init__(self) -> None:
+        self._stages: list[tuple[str, float]] = []
+        self._last = time.monotonic()
+
+    def open(self, what: str) -> int:
+        self._stages.append((what, time.monotonic()))
+        return len(self._stages) - 1
+
+    def report(self, stage: int, done: int, total: int) -> None:
+        now = time.monotonic()
+        if now - self._last >= _PIPED_S:
+            self._last = now
+            what, began = self._stages[stage]
+            print(line(what, done, total, now - began), file=sys.stderr, flush=True)
+
+    def close(self, stage: int) -> None:
+        del self._stages[stage:]
 
 
 class _Notebook:

@@ -7,12 +7,15 @@ from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from dynakin.cli.app import main
+from dynakin.cli.check_rows import _time
 from dynakin.cli.prepared import changed
+from dynakin.filter.prepared import Prepared
 from dynakin.messages import note, warning
 from dynakin.results.files.markers import write_trc
 from dynakin.results.files.storage import write_storage
@@ -170,3 +173,15 @@ def test_run_says_what_was_cut_or_turned_and_nothing_of_every_file() -> None:
     said = changed(SimpleNamespace(recording=blank))  # type: ignore[arg-type]
     assert [topic for topic, _ in said] == ["Note", "Note"]
     assert str(said[0][1]) == turned and "the last 3 frames: they are left out" in str(said[1][1])
+
+
+def test_how_long_a_run_takes_is_said_where_it_is_more_than_a_minute() -> None:
+    def ready(n_frames: int, n_markers: int, measured: tuple[bool, ...]) -> Prepared:
+        spec = SimpleNamespace(markers=[SimpleNamespace(measured=measured)] * n_markers)
+        calibrated = SimpleNamespace(spec=spec)
+        return cast(Prepared, SimpleNamespace(calibrated=calibrated, recording=SimpleNamespace(n_frames=n_frames)))
+
+    assert _time(ready(30_000, 72, (True, True, True))) == [
+        "A run takes about 9 min (30000 frames), on a busy machine more."
+    ]
+    assert not _time(ready(1346, 47, (True, True, True))) and not _time(ready(30_000, 20, (True, True, False)))

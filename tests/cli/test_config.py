@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 
 from dynakin.cli.app import main
+from dynakin.cli.options import _contacts
 from dynakin.errors import ConfigError
 from dynakin.pipeline.stages import configure
 from dynakin.settings import presets
@@ -180,3 +182,15 @@ def test_functional_trials_in_file_and_option(tmp_path: Path, capsys: pytest.Cap
         assert main([*words, "--model", "fullbody", "--functional", given]) == 2
         error = capsys.readouterr().err.strip()
         assert said in error and error.count("\n") == 0
+
+
+@pytest.mark.parametrize("text", [
+    "seat,rail=hand_r", '"seat", {name = "rail", segment = "hand_r"}',
+])  # fmt: skip
+def test_contacts_are_given_as_an_option_or_as_a_configuration_has_them(text: str) -> None:
+    assert _contacts(text) == ["seat", {"name": "rail", "segment": "hand_r"}]
+
+
+def test_braces_that_are_no_table_are_refused_with_the_form_that_works() -> None:
+    with pytest.raises(typer.BadParameter, match="expected names with commas: seat,rail=hand_r"):
+        _contacts("{rail}")

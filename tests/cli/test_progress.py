@@ -1,4 +1,4 @@
-"""What is seen of long work: stages with their remaining time, in a terminal and in a notebook, elsewhere nothing."""
+"""What is seen of long work: stages with their remaining time, in a terminal and a notebook, in a file now and then."""
 
 from __future__ import annotations
 
@@ -61,7 +61,20 @@ def test_a_terminal_shows_each_stage_with_its_share_and_what_remains(monkeypatch
     assert "estimating" in text and "40%" in text and "remaining" in text and "the plates again" in text
 
 
-def test_nothing_is_shown_in_a_file_or_by_a_worker(
+def test_a_file_has_a_plain_line_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = iter([0.0, 0.0, 10.0, 40.0, 50.0, 71.0])
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    with stage("estimating") as report:
+        for done in (10, 40, 50, 71):
+            report(done, 100)
+    assert capsys.readouterr().err.splitlines() == [
+        "estimating: 40 %, 0:40 passed, 1:00 remaining", "estimating: 71 %, 1:11 passed, 0:29 remaining",
+    ]  # fmt: skip
+
+
+def test_nothing_is_shown_of_short_work_in_a_file_or_by_a_worker(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with stage("estimating") as report:

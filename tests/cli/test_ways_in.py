@@ -130,6 +130,8 @@ def test_a_result_as_a_researcher_takes_it(from_python: dynakin.Result) -> None:
     for wrong in (None, 3):
         with pytest.raises(ConfigError, match=f"no quantity {wrong}, expected one of coordinates"):
             from_python.to_dataframe(wrong)  # type: ignore[arg-type]
+    cycles = from_python.cycles
+    assert cycles and all(one.movement == "squat" and one.end_s > one.start_s for one in cycles)
     assert from_python.events == estimate.events and from_python.failures.found == []
     assert from_python.metrics()["identifiability"]["advice"] == list(from_python.observability.advice)
     assert from_python.model.mass_kg == 70.0

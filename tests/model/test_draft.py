@@ -75,11 +75,47 @@ def judged(guesses: list[Guess], truth: dict[str, tuple[str | None, str, str]]) 
     ("ginocchio esterno sx", "KNE", "left"), ("tobillo interno izquierdo", "ANM", "left"),
     ("RToe1", "MT1", "right"), ("LToe5", "MT5", "left"),
     ("RToe", "TOE", "right"),
+    ("Knie_lat_re", "KNE", "right"), ("Trochanter_li", "GTR", "left"), ("MFK1_re", "MT1", "right"),
+    ("li Beckenkamm vorne", "ASI", "left"), ("re Beckenkamm hinten", "PSI", "right"), ("SIAS_re", "ASI", "right"),
+    ("COND_EXT_D", "KNE", "right"), ("COND_INT_G", "KNM", "left"), ("MAL_EXT_G", "ANK", "left"),
+    ("MAL_INT_D", "ANM", "right"), ("TROCH_D", "GTR", "right"), ("EIAS_D", "ASI", "right"), ("genou_G", "KNE", "left"),
+    ("cheville_D", "ANK", "right"), ("talon_G", "HEE", "left"), ("punta dx", "TOE", "right"),
+    ("RKNL", "KNE", "right"), ("LMAM", "ANM", "left"), ("L_KNEE_D", "KNE", "left"),
     ("GTRO_R", "GTR", "right"), ("LHJC", "HJC", "left"), ("R1stMet", "MT1", "right"), ("CV7", "C7", "centre"),
 ])  # fmt: skip
 def test_names_in_several_languages(name: str, place: str, side: str) -> None:
     found = said(name)
     assert found is not None and (found.place, found.side) == (place, side)
+
+
+def test_letters_that_count_a_cluster_are_no_side() -> None:
+    for name in ("thigh_d", "shank_d"):
+        found = said(name)
+        assert found is not None and (found.segment, found.side) == (name.split("_")[0], None)
+    french = said("cuisse_G")
+    assert french is not None and (french.segment, french.side) == ("thigh", "left")
+
+
+def test_sides_as_first_words_are_no_persons() -> None:
+    spelt = {"ASI": "Beckenkamm vorne", "PSI": "Beckenkamm hinten", "KNE": "Knie", "ANK": "Knöchel", "HEE": "Ferse"}
+    spelt |= {"TOE": "Zehe", "THI": "Oberschenkel", "TIB": "Unterschenkel"}
+    recording = simulate("fullbody", "squat", 36, 5.0, 50.0, markers="plug-in-gait-lower-body").recording
+    keep = [k for k, name in enumerate(recording.marker_names) if name[1:] in spelt]
+    names = [recording.marker_names[k] for k in keep]
+    german = tuple(f"{'re' if name[0] == 'R' else 'li'} {spelt[name[1:]]}" for name in names)
+    found = recognise(replace(recording, marker_names=german, markers=recording.markers[:, keep]))
+    assert found.match.names["KNE", "right"] == "re Knie" and len(found.match.names) == len(german)
+
+
+def test_names_that_differ_in_the_side_only_mark_one_place() -> None:
+    """Though where one of them lies says nothing of it."""
+    recording = simulate("fullbody", "squat", 35, 5.0, 50.0, markers="plug-in-gait-lower-body").recording
+    markers = recording.markers.copy()
+    markers[:, recording.marker_names.index("RKNE")] += [0.03, 0.07, 0.0]
+    names = tuple({"RKNE": "RXYZ", "LKNE": "LXYZ"}.get(name, name) for name in recording.marker_names)
+    found = {guess.recorded: guess for guess in guess_markers(replace(recording, marker_names=names, markers=markers))}
+    assert [(found[name].place, found[name].side) for name in ("RXYZ", "LXYZ")] == [("KNE", "right"), ("KNE", "left")]
+    assert "named as LXYZ" in found["RXYZ"].why and found["RXYZ"].sure == "unsure"
 
 
 def test_a_name_that_says_nothing() -> None:

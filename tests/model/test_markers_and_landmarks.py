@@ -137,3 +137,13 @@ def test_a_missing_marker_gives_no_landmark_never_zero() -> None:
     places = dict(PELVIS)
     places["ASI", "left"] = np.full(3, np.nan)
     assert "hip" not in LandmarkFinder(matched(), "right", None, planar=True).find(places)
+
+
+def test_a_place_that_a_set_of_ones_own_has_on_one_side_gives_no_way_to_the_other_sides_joint() -> None:
+    own, knees = load_marker_set("plug-in-gait"), ("KNE", "KNM", "KAX", "KD1", "KD2")
+    markers = tuple(m.model_copy(update={"right": ()}) if m.name in knees else m for m in own.markers)
+    names = ("RASI", "LASI", "RPSI", "LPSI", "RTHI", "RANK", "LKNE")
+    match = match_markers(own.model_copy(update={"markers": markers}), names, [True] * len(names), "trial")
+    finder = LandmarkFinder(match, "right", None, planar=False, in_space=True, height_m=1.7)
+    assert finder.lacking("knee", "right") == []
+    assert finder.lacking("knee", "left")

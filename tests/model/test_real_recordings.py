@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -54,6 +56,61 @@ def test_height_is_that_of_the_standing_trial(data_dir: Path, name: str) -> None
     """1.70 m. DJ1, a jump from a box, had 2.15 m: the highest shoulder of the trial over its lowest marker."""
     found = load_model("fullbody", Subject(mass_kg=60.05), "opencap").calibrate(opencap(data_dir, name))
     assert found.height_m == pytest.approx(1.703, abs=0.03)
+
+
+@pytest.mark.parametrize("named", ["plug-in-gait", "cast", "helen-hayes"])
+def test_a_named_set_that_knows_far_fewer_markers_than_another_is_refused(data_dir: Path, named: str) -> None:
+    """Held knees put a hip 57 deg off, and moments were absent."""
+    with pytest.raises(ModelError, match=rf"{named} knows \d of the 51 markers, opencap knows 47; expected --markers"):
+        load_model("fullbody", Subject(mass_kg=60.05), named).calibrate(opencap(data_dir, "walking1"))
+
+
+def test_a_named_set_of_a_part_of_the_body_is_taken(data_dir: Path) -> None:
+    recording = read(data_dir / PIG / "GaitNormal_1.c3d")
+    found = load_model("fullbody", Subject(mass_kg=60.05, height_m=1.7), "plug-in-gait-lower-body").calibrate(recording)
+    assert len(found.measured_plan().sites) == 18
+
+
+def test_knees_that_are_held_between_pelvis_and_foot_are_a_warning(data_dir: Path, tmp_path: Path) -> None:
+    """A set of one's own knows what it wants, and its knees may not be marked all the same."""
+    own = Path(str(resources.files("dynakin.model"))) / "markers" / "sets" / "plug-in-gait.toml"
+    mine = tmp_path / "mine.toml"
+    mine.write_text(own.read_text(encoding="utf-8").replace('name = "plug-in-gait"', 'name = "mine"'), encoding="utf-8")
+    found = load_model("fullbody", Subject(mass_kg=60.05), mine).calibrate(opencap(data_dir, "walking1"))
+    (said,) = [message for message in found.messages if message.topic == "held"]
+    assert said.level == "warning" and "the right knee and the left knee" in said.text
+    whole = load_model("fullbody", Subject(mass_kg=60.05)).calibrate(opencap(data_dir, "walking1"))
+    assert not [message for message in whole.messages if message.topic == "held"]
+
+
+def test_a_standing_trial_without_one_marker_of_the_trial_is_refused(data_dir: Path) -> None:
+    trial, static = read(data_dir / "c3d_parser/FMC/MH0222_BP06.c3d"), read(data_dir / "functional/anat_pose_ECH.c3d")
+    with pytest.raises(ModelError, match=r"none of its 73 markers is in MH0222_BP06; expected a standing trial"):
+        load_model("fullbody").calibrate(trial, static=static)
+
+
+@pytest.mark.parametrize(("one", "other"), [("LHEE", "LANK"), ("RHEE", "RANK"), ("LASI", "LPSI")])
+def test_a_refusal_names_the_exchanged_labels(data_dir: Path, one: str, other: str) -> None:
+    """Heel and ankle exchanged had a knee 9 deg off, without a word."""
+    trial = read(data_dir / "c3d_parser/FMC/MH0222_BP06.c3d")
+    swap = {one: other, other: one}
+    names = tuple(swap.get(name, name) for name in trial.marker_names)
+    with pytest.raises(ModelError, match=rf"{one} and {other} look swapped .*expected the labels corrected"):
+        load_model("fullbody").calibrate(replace(trial, marker_names=names))
+
+
+def test_a_missing_back_of_the_pelvis_is_said_for_all_that_needs_it(data_dir: Path) -> None:
+    trial = read(data_dir / "c3d_parser/FMC/MH0222_BP06.c3d")
+    kept = [k for k, name in enumerate(trial.marker_names) if name[1:] != "PSI"]
+    less = replace(trial, marker_names=tuple(trial.marker_names[k] for k in kept), markers=trial.markers[:, kept])
+    with pytest.raises(
+        ModelError, match=r"without a marker on the back of the pelvis .* the hips, and with them right"
+    ):
+        load_model("fullbody").calibrate(less)
+    swap = {"RKNE": "ROTT", "LKNE": "LOTT"}
+    other = replace(trial, marker_names=tuple(swap.get(name, name) for name in trial.marker_names))
+    with pytest.raises(ModelError, match=r"does not know ROTT, LOTT: if they mark these joints, say so in a set"):
+        load_model("fullbody").calibrate(other)
 
 
 def test_static1_as_the_trial_and_as_the_static(data_dir: Path) -> None:
@@ -125,8 +182,12 @@ def test_squat7_takes_opencap(data_dir: Path, table: str, markers: str) -> None:
 
 
 def test_a_wrong_marker_set_names_what_there_is(data_dir: Path) -> None:
+    squats = opencap(data_dir, "squats1")
+    kept = [k for k, name in enumerate(squats.marker_names) if "knee" not in name and "thigh" not in name]
+    names = tuple(squats.marker_names[k] for k in kept)
+    less = replace(squats, marker_names=names, markers=squats.markers[:, kept])
     with pytest.raises(ModelError, match=r"squats1\.trc.*it has C7, L\.ASIS") as error:
-        load_model("squat7", Subject(mass_kg=60.0), "plug-in-gait").calibrate(opencap(data_dir, "squats1"))
+        load_model("squat7", Subject(mass_kg=60.0), "opencap").calibrate(less)
     assert "tried" in error.value.message or "has no marker" in error.value.message
 
 

@@ -173,6 +173,36 @@ def test_a_name_that_says_a_place_where_it_does_not_lie_is_not_used() -> None:
     assert {"R_FLE", "RLFC"}.isdisjoint(recognise(again).match.names.values())
 
 
+def test_a_misplaced_marker_stays_left_out_where_names_add_others() -> None:
+    recording, _ = _in_own_names("visual3d-6dof")
+    markers = recording.markers.copy()
+    markers[:, recording.marker_names.index("RASIS")] += [0.0, 0.5, 0.3]
+    found = recognise(replace(recording, markers=markers))
+    assert ("ASI", "right") in found.match.left_out and "RASIS" not in found.match.names.values()
+    assert "used by what their names say" in found.messages[0].text
+    assert any("RASIS is left out: check its label" in text for text in warnings_of(found.messages))
+    assert found.wrong_n == 1
+
+
+def test_names_of_joint_centres_beside_a_marked_pelvis_are_on_the_skin() -> None:
+    """RKnee of somebody who wears RASIS is no joint centre; a hip's marker may be anywhere and is not used."""
+    whole, match = walking("qualisys-gait"), recognised("qualisys-gait").match
+    spelt = {"ASI": "ASIS", "PSI": "PSIS", "KNE": "Knee", "ANK": "Ankle", "HEE": "Heel"}
+    names = {(p, s): f"{s[0].upper()}{spelt[p]}" for s in ("right", "left") for p in spelt}
+    names |= {("MT1", s): f"{s[0].upper()}BigToe" for s in ("right", "left")}
+    columns = [whole.marker_names.index(match.names[key]) for key in names]
+    hips = [whole.marker_names.index(match.names["ASI", s]) for s in ("right", "left")]
+    recording = replace(
+        whole,
+        marker_names=(*names.values(), "RHip", "LHip"),
+        markers=np.concatenate([whole.markers[:, columns], whole.markers[:, hips] - [0.0, 0.1, 0.0]], axis=1),
+    )
+    found = recognise(recording).match
+    assert {key: name for key, name in found.names.items() if name[1:] in ("Knee", "Ankle", "Hip")} == {
+        (place, side): names[place, side] for place in ("KNE", "ANK") for side in ("right", "left")
+    }
+
+
 @pytest.mark.parametrize("spelt", [
     lambda name: f"S01:{name}", lambda name: f"Jane_Doe_{name}", str.lower, str.upper,
     lambda name: name.replace(".", "_"), lambda name: name.replace("_", " "),

@@ -208,7 +208,11 @@ def test_every_channel_has_a_scale_and_an_offset(tmp_path: Path, whole: bytes, n
     ("at", "new", "expected"),
     [
         (0, b"\x03", "found processor type"),
-        (START + 3, b"\x56", "found processor type 86 in the C3D parameters, expected 84 (Intel) or 85 (DEC)"),
+        (
+            START + 3,
+            b"\x56",
+            "processor type 86 (SGI, MIPS) in the C3D parameters, expected 84 (Intel) or 85 (DEC): save",
+        ),
         (0, b"\xff", "truncated C3D file, found"),
         (2, b"\xff\xff", "for 20 frames of 65535 points and 60 analog values"),
         (4, b"\x3b\x00", "expected the 59 analog values a frame of the header"),
@@ -219,6 +223,21 @@ def test_every_channel_has_a_scale_and_an_offset(tmp_path: Path, whole: bytes, n
 )
 def test_damaged_header(tmp_path: Path, whole: bytes, at: int, new: bytes, expected: str) -> None:
     assert expected in refused(tmp_path, changed(whole, at, new))
+
+
+def test_a_number_of_frames_that_is_a_float_is_read(tmp_path: Path, whole: bytes) -> None:
+    """The user guide's way beyond 65535 frames; ezc3d asks for an integer."""
+    kind, values = spot(whole, "POINT", "FRAMES", "type"), spot(whole, "POINT", "FRAMES", "values")
+    (offset,) = struct.unpack("<H", whole[kind - 2 : kind])
+    record = struct.pack("<H", offset + 2) + b"\x04" + whole[kind + 1 : values] + struct.pack("<f", float(T))
+    data_start = 512 * (struct.unpack("<H", whole[16:18])[0] - 1)
+    floated = whole[: kind - 2] + record + whole[values + 2 : data_start - 2] + whole[data_start:]
+    assert len(floated) == len(whole)
+    path = tmp_path / "a.c3d"
+    path.write_bytes(floated)
+    recording = read_c3d(path)
+    assert recording.n_frames == T
+    np.testing.assert_allclose(recording.marker("LASI"), 0.5)
 
 
 def test_harmless_contradictions_are_noted(tmp_path: Path, whole: bytes) -> None:

@@ -82,14 +82,23 @@ def test_hint_alone_is_followed_and_nothing_at_all_is_an_error() -> None:
 
 
 def test_given_axes_win() -> None:
-    frame = find_ground_frame(standing(), vertical="z", forward=(1.0, 1.0, 5.0))
+    frame = find_ground_frame(replace(standing(), plates=()), vertical="z", forward=(1.0, 1.0, 5.0))
     assert frame.vertical == "+Z"
     np.testing.assert_allclose(frame.forward, np.array([1, 1, 0]) / np.sqrt(2))
-    assert all("given" in sentence for sentence in frame.how)
+    assert sum("given" in sentence for sentence in frame.how) == 2
     with pytest.raises(ConfigError, match="expected one of"):
         find_ground_frame(standing(), vertical="up")
     with pytest.raises(ConfigError, match="across vertical"):
         find_ground_frame(standing(), vertical="+Y", forward="-Y")
+
+
+def test_a_given_vertical_that_body_and_plates_contradict_is_refused() -> None:
+    """Where the body alone does, as that of one who lies, it is said and not followed."""
+    still = standing()
+    assert "not followed" in " ".join(find_ground_frame(replace(still, plates=()), vertical="Z", forward="+X").how)
+    with pytest.raises(RecordingError, match=r"vertical is \+Z, but the body above .* force show \+Y; expected \+Y"):
+        find_ground_frame(still, vertical="Z", forward="+X")
+    assert find_ground_frame(still, vertical="Y", forward="+X").vertical == "+Y"
 
 
 def test_forward_without_feet_from_pelvis_and_without_both_from_walking() -> None:

@@ -65,6 +65,8 @@ def test_moments_in_another_unit_than_the_place_of_the_force_are_refused(squat: 
     [
         (lambda: dynakin.run(None), ConfigError, "run: trial is of type NoneType, expected a file"),  # type: ignore[arg-type]
         (lambda: dynakin.run(3), ConfigError, "trial is of type int"),  # type: ignore[arg-type]
+        (lambda: dynakin.read(["a"]), RecordingError, r"read: found \['a'\], forces None, expected names of files"),  # type: ignore[arg-type]
+        (lambda: dynakin.read("a.trc", 3), RecordingError, "forces 3, expected names of files"),  # type: ignore[arg-type]
         (lambda: dynakin.load_model(None), ModelError, "found None, expected the name of a model"),  # type: ignore[arg-type]
         (lambda: dynakin.Bounds(length_fraction=-0.2), ConfigError, "bounds: length_fraction: .* greater than 0"),
         (lambda: dynakin.Priors(unknown=1.0), ConfigError, "priors: unknown key 'unknown'; expected keys"),  # type: ignore[call-arg]

@@ -256,3 +256,11 @@ def test_plates_without_free_moment_are_said(tmp_path: Path) -> None:
     recording = attach_forces(plain(3), table, ReadOptions())
     np.testing.assert_allclose(recording.plates[0].moment[0], WRENCH_MOMENT - [0, 5, 0])
     assert any("no free moment" in note for note in map(str, recording.notes))
+
+
+@pytest.mark.parametrize(("separator", "named"), [(",", "commas"), (";", "semicolons")])
+def test_columns_parted_otherwise_are_named_with_what_parts_them(tmp_path: Path, separator: str, named: str) -> None:
+    text = single(np.arange(5) / 100.0).replace("\t", separator)
+    with pytest.raises(RecordingError, match=f"found columns parted by {named}, expected tabs or blanks") as error:
+        read_table(write(tmp_path, "grf.mot", text))
+    assert "ground_force_vx" not in error.value.message

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import tomllib
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -124,7 +125,13 @@ def _estimate(text: str) -> list[str]:
 
 
 def _contacts(text: str) -> list[Any]:
-    """`--contact seat,rail=hand_r` as a list; what is wrong with it is said with the settings."""
+    """`--contact seat,rail=hand_r` as a list, or as a configuration has it (`{name = "rail", segment = "hand_r"}`);
+    what is wrong with it is said with the settings."""
+    if "{" in text:
+        try:
+            return list(tomllib.loads(f"contacts = [{text}]")["contacts"])
+        except tomllib.TOMLDecodeError:
+            raise typer.BadParameter(f"--contact is {text!r}, expected names with commas: seat,rail=hand_r") from None
     parts = [part.strip().partition("=") for part in text.split(",") if part.strip()]
     return [{"name": name, "segment": segment} if equals else name for name, equals, segment in parts]
 

@@ -26,6 +26,7 @@ from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import DERIVED, MEASURED, in_use, moment_sources, plates_refused
+from dynakin.results.naming import listed, words
 from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ class Systematic:
         self.sizes = sizes or usual_sizes(calibrated).scaled(noise.systematic_scale)
         self._free = np.array(free_coordinates(spec))
         self._count = len(spec.coordinates)
+        self._locked = [c.name for c in spec.coordinates if c.locked and c.name not in calibrated.held]
         self._feet = len(calibrated.feet)
         reference = neutral(calibrated)
         self._errors = JointErrors.of(spec, reference, calibrated.held, less_sure_joints(calibrated))
@@ -340,12 +342,13 @@ class Systematic:
         moved_m = float(self.moved_m(x))
         if not moved_m > self.sizes.placed * MISFIT:
             return []
+        locked = f"; held still are {listed([words(name) for name in self._locked])}" if self._locked else ""
         return [
             warning(
                 "scaling",
                 f"markers lie {1000.0 * moved_m:.0f} mm (mean) from where the model has them, of a model that "
                 f"fits the person at most {1000.0 * self.sizes.placed:.0f} mm: the centres of its joints count as "
-                f"{moved_m / self.sizes.placed:.1f} times less sure, and axes that are turned as well do not.",
+                f"{moved_m / self.sizes.placed:.1f} times less sure, and axes that are turned as well do not{locked}.",
             )
         ]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -12,6 +12,7 @@ import numpy as np
 
 from dynakin.errors import ModelError
 from dynakin.files import is_file
+from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import (
     CalibratedModel,
     JointPrior,
@@ -24,6 +25,7 @@ from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
 from dynakin.model.markers.recognise import choose_marker_set, lacking, recognise
 from dynakin.model.markers.schema import MarkerSetFile
+from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
 from dynakin.model.plan import ModelPlan
 from dynakin.model.schema import ModelFile
@@ -32,6 +34,7 @@ from dynakin.model.table import BodyTable, load_table
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
+from dynakin.results.naming import listed
 from dynakin.settings.model import Bounds, OpenSimOptions, Priors
 from dynakin.settings.settings import FunctionalJoint
 from dynakin.settings.strict import nearest, read_toml, validate
@@ -207,6 +210,7 @@ class ModelDefinition:
             held = held | begun.held
         marked = plan.marked()
         unmarked_kg = sum(body.mass for name, body in plan.inertia.items() if name not in marked)
+        messages += _held_knees(held, marked)
         held = _not_known(plan, held)
         spec = to_core(plan)
         priors = priors or Priors()
@@ -243,6 +247,21 @@ class ModelDefinition:
             unmarked_joints=rest.unmarked_joints,
             one_sided_joints=rest.one_sided_joints,
         )
+
+
+def _held_knees(held: Collection[str], marked: Collection[str]) -> list[Message]:
+    """A warning of knees held between a pelvis and a foot that markers show: hip and ankle make up for them."""
+    sides = [side for side, s in SUFFIXES.items() if f"knee_angle{s}" in held and {"pelvis", f"foot{s}"} <= set(marked)]
+    if not sides:
+        return []
+    knees = listed([f"the {side} knee" for side in sides])
+    return [
+        warning(
+            "held",
+            f"no marker shows the bending of {knees}, which is held, while pelvis and foot are seen: angles and "
+            "moments of that hip and ankle are tens of degrees and N m off.",
+        )
+    ]
 
 
 def _not_known(plan: ModelPlan, held: Mapping[str, str]) -> dict[str, str]:

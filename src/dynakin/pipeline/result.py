@@ -24,6 +24,7 @@ from dynakin.results.files.markers import write_markers
 from dynakin.results.files.netcdf import write_netcdf
 from dynakin.results.measures.mean_curves import curve_points, estimate_curves, write_curves
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.repetitions import Repetition, repetitions_of
 from dynakin.results.measures.tracking import refuse_lost
 from dynakin.results.records import Event
 from dynakin.settings.settings import Settings
@@ -65,6 +66,11 @@ class Result:
     def events(self) -> list[Event]:
         """Markers that were missing or refused, bounds reached, resets."""
         return self.estimate.events
+
+    @property
+    def cycles(self) -> list[Repetition]:
+        """Whole squats or gait cycles after the adaptation, in the order of time; the report says why none are."""
+        return list(repetitions_of(self.estimate).items)
 
     def to_dataframe(self, quantity: str = "coordinates") -> pd.DataFrame:
         """A quantity of ``estimate.data`` over time, a column a name: coordinates (rad, m), speeds, moments (N m, N),

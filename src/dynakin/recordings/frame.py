@@ -9,9 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import cross, wrench_about
-from dynakin.errors import ConfigError
+from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
-from dynakin.recordings.orientation import axis_vector, find_forward, find_vertical, horizontal, refuse_mirrored
+from dynakin.recordings.orientation import (
+    against_vertical,
+    axis_vector,
+    find_forward,
+    find_vertical,
+    horizontal,
+    refuse_mirrored,
+)
 from dynakin.recordings.recording import Array, Recording
 
 UPRIGHT = {
@@ -129,6 +136,14 @@ def find_ground_frame(
         up = axis_vector(vertical)
         axis = ("+" if up.sum() > 0 else "-") + "XYZ"[int(np.argmax(np.abs(up)))]
         how = [f"Vertical {axis}: given."]
+        other, sure = against_vertical(recording, axis, pairs)
+        if sure:
+            raise RecordingError(
+                f"{recording.path or recording.name}: vertical is {axis}, but the body above the feet and the plates' "
+                f"force show {other}; expected {other}, or auto"
+            )
+        if other:
+            how.append(f"Vertical: the body above the feet shows {other}, not {axis}; not followed.")
     refuse_mirrored(recording, up, axis, pairs)
     if isinstance(forward, str) and forward.casefold() == "auto":
         ahead, found = find_forward(recording, up, pairs)

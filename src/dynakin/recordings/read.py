@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,8 @@ def read(
         RecordingError: a file that is not there, of an unknown kind, damaged, or forces that do not fit the
             markers.
     """
+    if not isinstance(path, str | PathLike) or not isinstance(forces, str | PathLike | None):
+        raise RecordingError(f"read: found {path!r}, forces {forces!r}, expected names of files")
     options = ReadOptions(plate_filter_hz, force_threshold_n, causal)
     path = Path(path)
     reader = READERS.get(path.suffix.casefold())

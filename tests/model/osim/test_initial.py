@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,8 @@ import pytest
 import dynakin
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.filter.systematic import Systematic
+from dynakin.messages import Message
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition, load_model
 from dynakin.model.opensim.calibrate import limits_of
@@ -54,6 +57,32 @@ def test_everything_from_the_file_but_mass_and_posture(folder: Path, squats: Rec
     assert np.sqrt(np.nanmean((gap**2).sum(axis=1))) < 0.012
     assert any("fits the markers to 11 mm" in text for text in map(str, found.messages))
     assert any("93 muscles" in text for text in map(str, found.messages))
+
+
+def test_coordinates_that_the_file_locks_are_named(folder: Path, squats: Recording, tmp_path: Path) -> None:
+    """A run said to scale the model again where the file held hips and an ankle that move."""
+    text = (folder / FILE).read_text(encoding="utf-8")
+    for name in ("hip_rotation_r", "ankle_angle_r"):
+        head, own, rest = text.partition(f'<Coordinate name="{name}">')
+        text = head + own + re.sub(r"<locked>.*?</locked>", "<locked>true</locked>", rest, count=1)
+    locked = tmp_path / "locked.osim"
+    locked.write_text(text, encoding="utf-8")
+    found = load_model(locked, Subject(mass_kg=60.05)).calibrate(squats)
+    assert any("The file locks hip_rotation_r, ankle_angle_r: held at its values." in m.text for m in found.messages)
+    (misfit,) = _moved(found, 0.03)
+    assert "held still are right hip rotation and right ankle angle" in misfit.text
+    whole = load_model(folder / FILE, Subject(mass_kg=60.05)).calibrate(squats)
+    assert not any("The file locks" in m.text for m in whole.messages)
+
+
+def _moved(calibrated: CalibratedModel, by_m: float) -> list[Message]:
+    """What is said where all markers turn out to lie so far from where the model has them."""
+    known = Systematic(calibrated, presets.default())
+    x = np.array(calibrated.x0)
+    for k, name in enumerate(calibrated.names):
+        if name.startswith("marker/") and name.endswith("/x"):
+            x[k] += by_m
+    return known.misfit(x)
 
 
 def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:

@@ -125,22 +125,28 @@ class LandmarkFinder:
         return any(self._key(source, side) is not None for source in own - self._recipes.keys())
 
     def lacking(self, name: str, side: str) -> list[frozenset[str]]:
-        """The fewest markers, by their first names in the set, with which a landmark would be known; each way to it."""
+        """The fewest markers, by their first names in the set, with which a landmark would be known; each way to it,
+        none where the set has no names for it."""
         if name not in self._recipes:
             if self._key(name, side) is not None:
                 return [frozenset()]
             marker = self.match.marker_set.marker(name)
-            return [frozenset([(marker.centre or (marker.right if side == "right" else marker.left))[0]])]
+            names = marker.centre or marker.aliases(side)
+            return [frozenset(names[:1])] if names else []  # a set of one's own may have a place on one side only
         if self.recipe(name, side) is not None:
             return [frozenset()]
         ways: list[frozenset[str]] = []
         for recipe in self._recipes[name]:
             own = [frozenset[str]()]
+            back = recipe.pelvis.psis if recipe.pelvis is not None else ""
             for source in recipe.inputs:
+                if source == back:  # of either side
+                    own = [a | b for a in own for s in SIDES for b in self.lacking(source, s)]
+                    continue
                 for s in SIDES if source in recipe.across else _sides(recipe, side):
                     own = [a | b for a in own for b in self.lacking(source, s)]
             ways += own
-        fewest = min(len(way) for way in ways)
+        fewest = min((len(way) for way in ways), default=0)
         return list(dict.fromkeys(way for way in ways if len(way) == fewest))
 
     def markers_of(self, name: str) -> set[MarkerKey]:

@@ -45,6 +45,7 @@ _AXIS_SD_DEG = 20.0
 _TURNED_RAD = np.radians(10.0)
 """Frames in which a knee is turned less from the calibration frames say nothing of its axis; a person who stands for
 most of a trial has many."""
+_LISTED = 8  # names in a sentence
 _BONE = 0.25
 """How far thigh and shank may be from the length that an adult of this height has, as a part of it."""
 _FOOT_SD_M = 0.015
@@ -217,6 +218,11 @@ def _check_residual(centre: Centre, bone: str) -> None:
         )
 
 
+_BACK = ("PSI", "SACR")
+_SHOWING = ("pelvis", *LEG)
+"""Segments whose markers show knees and ankles: with one marker on a joint, those of the pelvis too."""
+
+
 def supposed_legs(found: Completed, legs: Legs, chosen: Sequence[Candidate]) -> list[str]:
     """Knees and ankles of marked segments that are where an adult who stands has them."""
     marked = {candidate.segment for candidate in chosen}
@@ -232,7 +238,7 @@ def no_legs(
         expected = "another one, of the person standing still with markers on knees and ankles (--static)"
     said = f"no marker shows {listed([words(name) for name in supposed])}, and nobody stands still in it"
     match = source.match
-    on_legs = [why for (name, _), why in match.left_out.items() if match.marker_set.marker(name).segment in LEG]
+    on_legs = [why for (name, _), why in match.left_out.items() if match.marker_set.marker(name).segment in _SHOWING]
     whys = (why.removesuffix(f": {CORRECT}") for why in on_legs)
     if reasons := "; ".join(dict.fromkeys(whys)):
         text = f"{match.where}: {said}, because markers are left out: {reasons}; expected the labels corrected."
@@ -241,16 +247,30 @@ def no_legs(
         text = f"{match.where}: {short}, and nobody stands still in it; expected it, or {expected}."
     else:
         text = " ".join([f"{match.where}: {said}; expected {expected}.", *legs.failed])
+    if unknown := match.unexplained:
+        more = f" and {len(unknown) - _LISTED} more" if len(unknown) > _LISTED else ""
+        text += (
+            f" Marker set {match.marker_set.name} does not know {', '.join(unknown[:_LISTED])}{more}: if they mark "
+            "these joints, say so in a set of your own (dynakin markers new TRIAL -o my.toml)."
+        )
     return ModelError(text, asks_for="static")
 
 
 def _one_short(supposed: Sequence[str], finder: LandmarkFinder) -> str:
     """Which marker each of these joints lacks, where it is one marker of any of them."""
-    said = []
+    lacks: dict[str, list[str]] = {}
     for name in supposed:
         joint, side = name.split("_")[0], "right" if name.endswith("_r") else "left"
         ways = finder.lacking(joint, side)
         if {len(way) for way in ways} != {1} or not finder.touched(joint, side):
             return ""
-        said.append(f"{words(name)} is not known without {' or '.join(dict.fromkeys(m for way in ways for m in way))}")
-    return " and ".join(said)
+        lacks[words(name)] = list(dict.fromkeys(marker for way in ways for marker in way))
+    set_ = finder.match.marker_set
+    backs = {a for m in set_.markers if m.name in _BACK for a in (*m.right, *m.left, *m.centre)}
+    of_all = [
+        one for one in next(iter(lacks.values()), []) if one in backs and all(one in own for own in lacks.values())
+    ]
+    if len(lacks) > 1 and of_all:
+        where = f"a marker on the back of the pelvis (PSIS or sacrum; {set_.name}: {', '.join(of_all)})"
+        return f"without {where} the hips, and with them {listed(list(lacks))}, are not known"
+    return " and ".join(f"{name} is not known without {' or '.join(own)}" for name, own in lacks.items())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,14 +30,16 @@ from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, Legs, legs_in_m
 from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
-from dynakin.model.markers.match import MarkerKey, MarkerMatch
-from dynakin.model.markers.recognise import recognise
+from dynakin.model.markers.match import MarkerKey, MarkerMatch, without_prefix
+from dynakin.model.markers.recognise import recognise, refuse_unfit
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
 from dynakin.recordings.companions import another_person
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
+from dynakin.recordings.landmarks import plain_name
+from dynakin.recordings.orientation import against_vertical
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.results.naming import listed, words
@@ -138,7 +140,13 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     found, unmarked = _landmarks(asked, marked, still, messages)
     mass_kg, height_m = _mass_and_height(asked, marked, still, messages)
     messages += found.messages
-    check_body_mass(subject, mass_kg, height_m)
+    try:
+        check_body_mass(subject, mass_kg, height_m)
+    except ModelError as error:
+        ground = trials.trial.ground
+        other, _ = against_vertical(asked.recording, ground.vertical, trials.trial.match.facing_pairs)
+        why = f"; vertical is {ground.vertical}, but the markers show {other}" if other else ""
+        raise ModelError(f"{error.message}{why}") from None
     if subject.sex is None:
         messages.append(
             note(
@@ -186,6 +194,8 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
 def _matched(asked: Asked, messages: list[Message]) -> _Trials:
     """Markers and ground of the recordings."""
     model, recording, static = asked.model, asked.recording, asked.static
+    if asked.marker_set is not None:
+        refuse_unfit(asked.marker_set, recording)
     recognised = recognise(recording, asked.marker_set)
     messages += recognised.messages
     as_asked = Trial.of(recording, recognised.match, asked.ground or asked.find_ground(recording, recognised.match))
@@ -198,12 +208,20 @@ def _matched(asked: Asked, messages: list[Message]) -> _Trials:
     if static is None:
         return _Trials(as_asked, trial, trial, side)
     stands = recognise(static, recognised.match.marker_set)
-    messages += [replace(said, text=f"{said.text} ({static.name})") for said in stands.messages]
+    if _own_names(recording).isdisjoint(_own_names(static)):
+        raise ModelError(
+            f"{static.path or static.name}: none of its {len(static.seen_names)} markers is in {recording.name}; "
+            "expected a standing trial (--static) of the same person with the same markers"
+        )
     source = Trial.of(static, stands.match, asked.find_ground(static, stands.match))
     source = source.facing() if model.floating else source
     if other := another_person(recording, static):
         messages.append(warning("calibration", f"{other}. Lengths and marker places are those of {static.name}."))
     return _Trials(as_asked, trial, source, side)
+
+
+def _own_names(recording: Recording) -> set[str]:
+    return set(map(plain_name, without_prefix(tuple(recording.seen_names)).values()))
 
 
 def _marked(asked: Asked, trials: _Trials, messages: list[Message]) -> _Marked:

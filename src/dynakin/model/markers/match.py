@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 from dynakin.errors import ModelError
 from dynakin.model.markers.schema import Marker, MarkerSetFile
+from dynakin.model.markers.side_words import SIDE_WORDS
 from dynakin.recordings.landmarks import FacingPairs, plain_name
 
 MarkerKey = tuple[str, str]
@@ -198,7 +199,7 @@ def without_prefix(names: tuple[str, ...]) -> dict[str, str]:
 def _persons(own: dict[str, str]) -> dict[str, str]:
     """Names without the first word, where all begin with one of a few words, followed by the same rests."""
     split = {name: _SEPARATORS.split(word, maxsplit=1) for name, word in own.items()}
-    if any(len(parts) < 2 or parts[0].casefold() in _SIDE_WORDS for parts in split.values()):
+    if any(len(parts) < 2 or parts[0].casefold() in SIDE_WORDS for parts in split.values()):
         return {}
     groups: dict[str, set[str]] = defaultdict(set)
     for first, rest in split.values():

@@ -10,6 +10,7 @@ import numpy as np
 from dynakin.errors import ModelError, RecordingError
 from dynakin.messages import Message, note, warning
 from dynakin.model.markers.anatomy import anatomy
+from dynakin.model.markers.draft.by_name import said, worn
 from dynakin.model.markers.draft.draft import Guess, drafted, further, names_of
 from dynakin.model.markers.geometry import (
     Expected,
@@ -39,6 +40,7 @@ CORRECT = "correct the labels"
 _ON_LEG_AT_LEAST = 2  # segments of one leg
 _ROOT = "pelvis"
 _ABOUT_AS_MANY = 0.9  # of the markers that the first set explains
+_FAR_FEWER = 0.5  # than another set knows: `plug-in-gait` of OpenCap's markers has 6 of 27
 _IMPOSSIBLE = 4.5  # deviations of a distance beyond which it is none of a body (2.9 at most in shared/data)
 _FEW_WRONG, _MANY_WRONG = 2, 0.25
 _HALF, _START_S = 0.5, 0.2
@@ -52,12 +54,14 @@ class Fit:
     Attributes:
         names: of the markers that are there. doubled: aliases that several names fit.
         expected_n: markers that the whole set has, each side counted.
+        worn: it has joint centres for names that, beside markers on the pelvis, are those of markers on the skin.
     """
 
     marker_set: MarkerSetFile
     names: dict[MarkerKey, str]
     doubled: dict[str, list[str]]
     expected_n: int
+    worn: bool = False
 
     @property
     def explained_n(self) -> int:
@@ -100,14 +104,17 @@ def _segment(marker_set: MarkerSetFile, name: str) -> str:
 def fits(recorded: Iterable[str]) -> list[Fit]:
     """The built-in sets compared with names, the one that explains most of them first, of equals the one with fewest
     markers that are not there; ``-all`` variants, which are for who asks for them, are left away."""
-    spelt = Spellings.of(recorded)
+    own = tuple(recorded)
+    spelt, on_skin = Spellings.of(own), worn(told.place for name in own if (told := said(name)) is not None)
     found = []
     for name in available_marker_sets():
         if name.endswith("-all"):
             continue
         set_ = load_marker_set(name)
         names, doubled = found_markers(set_, spelt)
-        found.append(Fit(set_, names, doubled, sum(len(m.aliases(s)) > 0 for m in set_.markers for s in SIDES)))
+        expected_n = sum(len(m.aliases(s)) > 0 for m in set_.markers for s in SIDES)
+        centres = on_skin and any(place == "KJ" for place, _ in names)
+        found.append(Fit(set_, names, doubled, expected_n, centres))
     return sorted(found, key=lambda fit: (-fit.explained_n, fit.expected_n - fit.explained_n, fit.marker_set.name))
 
 
@@ -122,15 +129,44 @@ def choose_marker_set(recorded: Iterable[str], where: str = "the recording") -> 
 
 
 def _usable(ranked: Sequence[Fit], where: str) -> list[Fit]:
-    found = [fit for fit in ranked if not fit.lacking]
+    found = [fit for fit in ranked if not fit.lacking and not fit.worn]
     if not found:
         best = ranked[0]
+        if best.worn and not best.lacking:
+            knee = next(name for (place, _), name in best.names.items() if place == "KJ")
+            raise ModelError(
+                f"{where}: {knee} is a joint centre in {best.marker_set.name}, but here are markers on the pelvis' "
+                "skin; expected a set of your own that says what is on the skin: dynakin markers new TRIAL -o my.toml"
+            )
         why = f"best: {best.marker_set.name} with {best.explained_n} markers; it lacks {'; '.join(best.lacking)}"
         raise ModelError(
             f"{where}: no marker set fits ({why if best.explained_n else 'none knows any of the names'}), expected "
             "names of a set of `dynakin markers list`, or a set of your own: dynakin markers new TRIAL -o my.toml"
         )
     return found
+
+
+def refuse_unfit(asked: MarkerSetFile, recording: Recording) -> None:
+    """Refuse a built-in set that knows far fewer markers of pelvis and legs than another, as one named by mistake.
+
+    Raises:
+        ModelError: names both, and how many markers each knows.
+    """
+    if asked.name not in available_marker_sets() or asked != load_marker_set(asked.name):
+        return  # one of the user's own knows what it wants
+    ranked = fits(recording.seen_names)
+    best = next((fit for fit in ranked if not fit.lacking and not fit.worn), None)
+    names, _ = found_markers(asked, Spellings.of(recording.seen_names))
+    if best is not None and _on_legs(asked, names) < _FAR_FEWER * _on_legs(best.marker_set, best.names):
+        raise ModelError(
+            f"{recording.path or recording.name}: {asked.name} knows {len(names)} of the {len(recording.seen_names)} "
+            f"markers, {best.marker_set.name} knows {best.explained_n}; expected --markers {best.marker_set.name}, or "
+            "no --markers"
+        )
+
+
+def _on_legs(marker_set: MarkerSetFile, names: Mapping[MarkerKey, str]) -> int:
+    return sum(_segment(marker_set, name) in (_ROOT, *LEG) for name, _ in names)
 
 
 @dataclass(frozen=True)
@@ -195,20 +231,23 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
 
 def _enlarged(recording: Recording, found: Recognised) -> tuple[Recognised, list[Guess]]:
     """With markers whose names the set does not know but say a place that it leaves free, and these; without those that
-    the body contradicts, and without any that have a marker of the set left out."""
+    the body contradicts, and without any that have a marker of the set left out. What is left out stays so."""
     more = further(recording, found.match)
     while more:
         set_ = enlarged_marker_set(found.match.marker_set.name, names_of(more))
         match = match_markers(set_, recording.marker_names, recording.seen, found.match.where)
+        names = {key: name for key, name in match.names.items() if key not in found.match.left_out}
+        match = replace(match, names=names | found.match.names, left_out=found.match.left_out)
         try:
             own = checked(recording, match)
         except ModelError:
             break
+        own = replace(own, messages=tuple(dict.fromkeys((*found.messages, *own.messages))))
         gone = {match.names[key] for key in own.match.left_out if key in match.names}
         kept = [guess for guess in more if guess.recorded not in gone]
         if len(kept) == len(more):
             if found.match.names.items() <= own.match.names.items():
-                return own, more
+                return replace(own, wrong_n=own.wrong_n + found.wrong_n), more
             break
         more = kept
     return found, []

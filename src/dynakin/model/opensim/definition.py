@@ -32,7 +32,7 @@ from dynakin.model.opensim.feet import feet_of
 from dynakin.model.opensim.person import person_of
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import sites, skin_of
-from dynakin.model.opensim.spec import moved_by, to_spec, unseen
+from dynakin.model.opensim.spec import independent_coordinates, moved_by, to_spec, unseen
 from dynakin.model.schema import kinds_of
 from dynakin.model.state_priors import state_bounds, state_prior
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
@@ -154,6 +154,10 @@ class OpenSimDefinition:
                     f"Coordinates that move no measured marker, locked at the file's value: {', '.join(lock)}.",
                 )
             )
+        fixed = [c.name for c in independent_coordinates(source) if c.locked]
+        if fixed:
+            words = f"The file locks {', '.join(fixed)}: held at its values. Unlock there what the person moves."
+            messages.append(note("calibration", words))
         carried = estimated_bodies(source, options.lightest_share, messages)
 
         def spec_at(values: dict[str, float]) -> _core.ModelSpec:

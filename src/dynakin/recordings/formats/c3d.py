@@ -94,6 +94,11 @@ def _recording(data: Any, path: Path, options: ReadOptions, notes: list[Message]
         raise RecordingError(f"{path}: found point rate {rate:g} Hz, expected {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz")
     points, found = _points(data, parameters)
     frames = points.shape[2]
+    if frames and not found.names and found.unlabelled:
+        raise RecordingError(
+            f"{path}: {found.unlabelled} unlabelled points and no marker; expected points labelled in the capture "
+            "software, and exported again"
+        )
     if frames == 0 or not found.names:
         raise RecordingError(f"{path}: found {frames} frames of {len(found.names)} labelled markers, expected some")
     raw = points[:, found.markers].transpose(2, 1, 0)  # (T, M, 3)

@@ -31,13 +31,15 @@ length may change with time; no four markers come near both."""
 
 @dataclass(frozen=True)
 class Points:
-    """Indices of a file's points that are markers, their names, and those of the points that a model computed."""
+    """Indices of a file's points that are markers, their names, and those of the points that a model computed; how many
+    have no label."""
 
     markers: list[int]
     names: tuple[str, ...]
     outputs: list[int]
     labels: tuple[str, ...]
     notes: list[Message]
+    unlabelled: int = 0
 
 
 def sort_points(parameters: Parameters, points: Array) -> Points:
@@ -71,7 +73,7 @@ def sort_points(parameters: Parameters, points: Array) -> Points:
                 "routine", f"Computed centre of mass is no marker and left out: {', '.join(labels[k] for k in masses)}."
             )
         )
-    return Points(keep, tuple(labels[k] for k in keep), outputs, tuple(labels), notes)
+    return Points(keep, tuple(labels[k] for k in keep), outputs, tuple(labels), notes, len(unlabelled))
 
 
 def _plain(label: str) -> str:

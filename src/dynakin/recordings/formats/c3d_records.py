@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import re
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from dynakin.errors import RecordingError
@@ -71,7 +71,7 @@ Groups = dict[str, dict[str, Record]]
 def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[Groups, list[Correction]]:
     """Parameters by group and name, upper case, and the section written anew where ezc3d could not read it: names in
     small letters, records with a few bytes of padding behind them, descriptions of 128 characters or more (these are
-    cut).
+    cut), a number of frames as a float.
 
     Args:
         section: bytes from the start of the parameter section to where the data begin.
@@ -104,13 +104,16 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[
         inside = section[:following]
         if group < 0:
             names.setdefault(-group, name)
-            end = here + 2
+            end, values = here + 2, b""
         else:
             record, end = _parameter(inside, here + 2, start + len(anew) - at, path, what, dec)
+            values = section[here + 2 : end]
+            if name == "FRAMES" and record.kind == 4 and record.first() >= 0.0:
+                record, values = _whole(record)
             found.setdefault(group, {})[name] = record
         length = _take(inside, end, 1, start, path, what)[0]
         description = _take(inside, end + 1, length, start, path, what)[:_MAX_DESCRIPTION]
-        content = section[here + 2 : end] + bytes([len(description)]) + description
+        content = values + bytes([len(description)]) + description
         end += 1 + length
         anew += (
             section[at : at + 2]
@@ -131,6 +134,13 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[
         groups.setdefault(name, found.get(number, {}))  # of two groups with one name ezc3d takes the first
     same = section.startswith(anew)
     return groups, [] if same else [(start, bytes(anew.ljust(len(section), b"\0")))]
+
+
+def _whole(frames: Record) -> tuple[Record, bytes]:
+    """A number of frames that is written as a float (the user guide's way beyond 65535) as the integer that ezc3d asks
+    for, which takes 65535 as up to the file's end; and as it stands in the file, with its type."""
+    raw = struct.pack("<H", min(round(frames.first()), 65535))
+    return replace(frames, kind=2, raw=raw), b"\x02\x00" + raw
 
 
 def _in_capitals(name: bytes) -> bytes:
@@ -170,7 +180,7 @@ def _take(section: bytes, at: int, size: int, start: int, path: Path, what: str)
 # Layout: C3D user guide, header section (512 bytes; words of 2 bytes, numbered from 1) and parameter section.
 _KEY = 0x50
 _BLOCK = 512
-_INTEL, _DEC = 84, 85  # 86, MIPS, is unknown to ezc3d
+_INTEL, _DEC, _SGI = 84, 85, 86  # the last is unknown to ezc3d
 
 
 def check_c3d_file(path: Path) -> tuple[list[Message], list[Correction]]:
@@ -201,8 +211,10 @@ def check_c3d_file(path: Path) -> tuple[list[Message], list[Correction]]:
         )
     processor = section[3]
     if processor not in (_INTEL, _DEC):
+        sgi = " (SGI, MIPS)" if processor == _SGI else ""
         raise RecordingError(
-            f"{path}: found processor type {processor} in the C3D parameters, expected {_INTEL} (Intel) or {_DEC} (DEC)"
+            f"{path}: found processor type {processor}{sgi} in the C3D parameters, expected {_INTEL} (Intel) or {_DEC} "
+            "(DEC): save the file again in Intel's format, with the capture software or Mokka"
         )
     header = _header(head, dec=processor == _DEC)
     expected = header.data_start + header.frames * header.frame_bytes

@@ -23,6 +23,8 @@ from dynakin.recordings.recording import Array
 _ENTRY = re.compile(
     r"^\s*(nRows|nColumns|inDegrees|datarows|datacolumns|name|range|version)\s*[=:\s]\s*(.+?)\s*$", re.I
 )
+_PARTED = re.compile(r'^\s*"?time"?\s*([,;|])', re.I)
+_SEPARATORS = {",": "commas", ";": "semicolons", "|": "bars"}
 _SYNONYMS = {"datarows": "nrows", "datacolumns": "ncolumns"}
 
 
@@ -97,6 +99,10 @@ def _names_line(lines: list[str], path: Path) -> int:
         if cells := split_cells(lines[k].rstrip()):
             if cells[0].casefold() == "time":
                 return k
+            if parted := _PARTED.match(lines[k]):
+                raise RecordingError(
+                    f"{path}, line {k + 1}: found columns parted by {_SEPARATORS[parted[1]]}, expected tabs or blanks"
+                )
             if end >= 0 and any(cells):
                 raise RecordingError(f"{path}, line {k + 1}: found column {cells[0]!r} first, expected 'time'")
     raise RecordingError(f"{path}: is not a MOT or STO table, found no line of column names that begins with 'time'")

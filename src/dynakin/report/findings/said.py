@@ -25,6 +25,11 @@ _KINDS = (
         "Look at the first of these times: markers swapped or off, or a movement that the start does not fit.",
     ),
     _Kind("Guessed marker places", ("guessed",), "Correct the places that are wrong, and give that marker set."),
+    _Kind(
+        "Held knees",
+        ("held",),
+        "Use the set that names the markers of thighs and shanks (dynakin markers new), or record some there.",
+    ),
     _Kind("Joint centres", ("joints",), "Give a standing trial with markers on knees and ankles (--static)."),
     _Kind(
         "Mass",
@@ -41,7 +46,8 @@ _KINDS = (
     _Kind(
         "Model scaling",
         ("scaling",),
-        "Scale the model to the person again, by a standing trial, or run without --model: fullbody measures its own.",
+        "Unlock in the model's file what is held still and moves, else scale the model to the person again, by a "
+        "standing trial, or run without --model: fullbody measures its own.",
     ),
     _Kind(
         "Identified parameters",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -13,50 +14,19 @@ from typing import Any, Literal
 from dynakin.errors import ModelError
 from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.side_words import LONG_SIDE_WORDS, SHORT_SIDE_WORDS
 from dynakin.recordings.landmarks import plain_name
 from dynakin.settings.strict import read_toml
 
 Sure = Literal["sure", "likely", "unsure"]
 
 _FILE = resources.files("dynakin.model") / "markers" / "draft" / "places.toml"
-_WORDS = {
-    "right": (
-        "right",
-        "rechts",
-        "derecha",
-        "derecho",
-        "rechter",
-        "direita",
-        "direito",
-        "droite",
-        "droit",
-        "destro",
-        "destra",
-        "rt",
-        "dx",
-        "r",
-    ),
-    "left": (
-        "left",
-        "links",
-        "izquierda",
-        "izquierdo",
-        "linker",
-        "esquerda",
-        "esquerdo",
-        "gauche",
-        "sinistro",
-        "sinistra",
-        "lt",
-        "sx",
-        "l",
-    ),
-}
+_FRENCH = ("cuisse", "jambe", "pied")
 # Segments whose clusters are named after them, longest word first.
 _SEGMENTS = {
     "thigh": ("oberschenkel", "upperleg", "thigh", "femur", "cuisse", "muslo", "coscia", "uleg", "tgh", "thi", "th"),
-    "shank": ("unterschenkel", "lowerleg", "shank", "tibia", "jambe", "calf", "shin", "lleg", "leg", "tib", "sha",
-              "shk", "sk", "sh"),
+    "shank": ("unterschenkel", "lowerleg", "shank", "tibia", "jambe", "gamba", "calf", "shin", "lleg", "leg", "tib",
+              "sha", "shk", "sk", "sh"),
     "foot": ("midfoot", "foot", "fuss", "pied"),
     "pelvis": ("pelvis", "becken", "bassin", "pelv", "pel"),
     "upper_arm": ("upperarm", "oberarm", "humerus", "deltoid", "triceps", "biceps", "bicep", "uparm", "uarm",
@@ -76,6 +46,7 @@ _CENTRES = {
     "a": "AJC",
     "s": "SJC",
 }
+_SKIN_OVER = {"KJ": "KNE", "AJ": "ANK"}
 _CENTRE = re.compile(r"^(hip|knee|ankle|shoulder|[hkas])(jc|jointcent(?:er|re)|cent(?:er|re)|joint)(?:reg)?$")
 _QUALIFIED = (
     r"(?:\d+|[a-d]|front|rear|back|top|bottom|upper|lower|up|low|lat|med|ant|post|sup|inf|prox|dist"
@@ -137,6 +108,26 @@ def said(name: str) -> Said | None:
     return None
 
 
+def said_together(names: Iterable[str]) -> dict[str, Said]:
+    """What names say that stand in one recording, those that say something.
+
+    Beside markers on the pelvis' skin (`worn`), names that markerless systems give to joint centres (RKnee) are those
+    of markers on the skin; a hip's may be anywhere between trochanter and crest.
+    """
+    found = {name: own for name in names if (own := said(name)) is not None}
+    if not worn(own.place for own in found.values()):
+        return found
+    skin = {name: replace(own, place=_SKIN_OVER.get(own.place or "", own.place)) for name, own in found.items()}
+    return {name: own for name, own in skin.items() if own.place != "HJ"}
+
+
+def worn(said_places: Iterable[str | None]) -> bool:
+    """Whether who has these places named wears markers: on the pelvis, and not beside the joint centres of a system
+    that needs none."""
+    there = set(said_places)
+    return bool(there & {"ASI", "PSI"}) and not {"KJ", "KNE"} <= there
+
+
 def sided(name: str) -> tuple[str | None, str]:
     """Side and rest of a name by its likeliest reading."""
     return _readings(name)[0]
@@ -157,12 +148,12 @@ def _readings(name: str) -> list[tuple[str | None, str]]:
     last = "".join(c for c in letters if not unicodedata.combining(c))  # Knöchel, malléole
     tokens = [t.casefold() for t in re.findall(r"[^\W\d_]?[a-z]+|[A-Z]+(?![a-z])|\d+", last)]
     found: list[tuple[str | None, str]] = []
-    for side, words in _WORDS.items():
+    for side, words in LONG_SIDE_WORDS.items():
         for k in (0, len(tokens) - 1, *range(1, len(tokens) - 1)):
             if len(tokens) > 1 and tokens[k] in words:
                 found.append((side, "".join(tokens[:k] + tokens[k + 1 :])))
     whole = "".join(tokens)
-    for side, words in _WORDS.items():
+    for side, words in LONG_SIDE_WORDS.items():
         for word in words:
             if len(word) > 2 and whole.startswith(word) and len(whole) > len(word):
                 found.append((side, whole[len(word) :]))
@@ -171,6 +162,11 @@ def _readings(name: str) -> list[tuple[str | None, str]]:
     for side in ("right", "left"):
         if len(whole) > 1 and whole[0] == side[0]:
             found.append((side, whole[1:]))
+    for side, words in SHORT_SIDE_WORDS.items():
+        for k in {0, len(tokens) - 1}:
+            rest = "".join(tokens[:k] + tokens[k + 1 :])
+            if len(tokens) > 1 and tokens[k] in words and (len(tokens[k]) > 1 or rest in _FRENCH or _place(rest)):
+                found.append((side, rest))
     found.append((None, whole))
     for side in ("right", "left"):
         if len(whole) > 2 and whole[-1] == side[0]:

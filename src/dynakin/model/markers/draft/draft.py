@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter, defaultdict
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,7 +26,7 @@ from dynakin.model.markers.draft.by_geometry import (
     mirrored_node,
     segment_at,
 )
-from dynakin.model.markers.draft.by_name import Sure, places, said
+from dynakin.model.markers.draft.by_name import Sure, places, said_together
 from dynakin.model.markers.match import MarkerMatch, is_unlabelled
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.recordings.frame import UPRIGHT
@@ -84,7 +84,8 @@ def guess_markers(recording: Recording) -> list[Guess]:
             "stands before a colon, expected names that differ, of one person"
         )
     stands = standing_window(recording) is not None
-    by_name = {k: found for k, name in enumerate(names) if (found := said(name)) is not None}
+    spoken = said_together(names)
+    by_name = {k: spoken[name] for k, name in enumerate(names) if name in spoken}
     named = {k: (f.place, f.side) for k, f in by_name.items() if f.place in places() and f.side is not None}
     person = _person(recording, at, {k: (str(place), str(side)) for k, (place, side) in named.items()})
     guesses = []
@@ -98,7 +99,7 @@ def guess_markers(recording: Recording) -> list[Guess]:
             guesses.append(_checked(guess, person, k, stands))
         else:
             guesses.append(lies)
-    return _without_rivals(_one_each(guesses), names, person)
+    return _without_rivals(_as_on_the_other_side(_one_each(guesses), spoken), names, person, spoken)
 
 
 def drafted(recording: Recording) -> MarkerSetFile | None:
@@ -130,11 +131,12 @@ def further(recording: Recording, match: MarkerMatch) -> list[Guess]:
     except RecordingError:
         return []  # names that differ by case alone: which is which nobody knows
     left, taken = set(match.unexplained), {*match.names, *match.left_out}
-    claims = Counter((own.place, own.side) for name in left if (own := said(name)) is not None)
+    spoken = said_together(guess.recorded for guess in guesses)
+    claims = Counter((own.place, own.side) for name, own in spoken.items() if name in left)
     sided = {marker.name: not marker.centre for marker in match.marker_set.markers}
     found = []
     for guess in guesses:
-        if guess.recorded not in left or guess.sure == "unsure" or said(guess.recorded) is None:
+        if guess.recorded not in left or guess.sure == "unsure" or guess.recorded not in spoken:
             continue
         if guess.place is None:
             fits = guess.segment in _FOLLOWED
@@ -246,7 +248,9 @@ _OFF_LINE = 0.006  # of the height
 _TURNED_OUT = np.array([0.98, 0.0, 0.17])  # a right foot, as people stand
 
 
-def _without_rivals(guesses: list[Guess], names: list[str], person: Stature | None) -> list[Guess]:
+def _without_rivals(
+    guesses: list[Guess], names: list[str], person: Stature | None, spoken: Container[str]
+) -> list[Guess]:
     """Places known only by where markers lie, as markers that follow the segment where a neighbour of the place is as
     good a reading."""
     if person is None:
@@ -259,7 +263,7 @@ def _without_rivals(guesses: list[Guess], names: list[str], person: Stature | No
             doubt = f"; {' or '.join(_ALONE)}, or near them"
         if guess.place in _OUTWARD and not _on_its_side(guess, at):
             doubt = f"; {' or '.join(_OUTWARD)}"
-        if doubt and guess.sure == "likely" and said(guess.recorded) is None:
+        if doubt and guess.sure == "likely" and guess.recorded not in spoken:
             segment = str(anatomy()["places"][guess.place]["segment"])
             guess = replace(guess, place=None, segment=segment, why=guess.why + doubt)
         found.append(guess)
@@ -291,6 +295,22 @@ def _one_each(guesses: list[Guess]) -> list[Guess]:
             segment = anatomy()["places"][guess.place].get("segment")
             why = f"{guess.why}: {guess.place}, which {best[guess.place, guess.side].recorded} is"
             guess = replace(guess, place=None, segment=segment, sure="unsure", why=why)
+        found.append(guess)
+    return found
+
+
+def _as_on_the_other_side(guesses: list[Guess], spoken: Container[str]) -> list[Guess]:
+    """Names that say nothing and differ in the side only mark one place: that of whichever has one."""
+    unsaid = [guess for guess in guesses if guess.side != "centre" and guess.recorded not in spoken]
+    taken = {(guess.place, guess.side) for guess in guesses}
+    found = []
+    for guess in guesses:
+        mates = [g for g in unsaid if g.side != guess.side and _rest(g.recorded) == _rest(guess.recorded)]
+        if guess in unsaid and not guess.place and len(mates) == 1 and mates[0].place:
+            place = mates[0].place
+            if (place, guess.side) not in taken:
+                why = f"it is named as {mates[0].recorded} on the other side"
+                guess = replace(guess, place=place, segment=None, sure="unsure", why=why)
         found.append(guess)
     return found
 
