@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -110,6 +111,16 @@ def test_who_stands_over_a_plates_edge_is_not_weighed(shift_m: float, weighs: bo
     assert found.mass_kg_from_plates == (pytest.approx(70.0) if weighs else None)
     said = [text for text in map(str, found.messages) if "over the edge of plate 1" in text]
     assert bool(said) != weighs
+
+
+@pytest.mark.parametrize(("rows", "axis"), [([0, 2, 1], r"\+Z"), ([1, 0, 2], r"\+X")])
+def test_forces_in_other_axes_than_the_markers_are_named(rows: list[int], axis: str) -> None:
+    """They passed for plates that nobody loads, whose channels were to be looked at."""
+    made = standing(70.0)
+    plates = tuple(replace(plate, force=plate.force[:, rows]) for plate in made.plates)
+    found = check(made.with_plates(plates))
+    assert found.refusal is not None
+    assert re.search(rf"the forces lie along {axis} \(6[0-9]+ N .*, vertical is \+Y: give the forces in", found.refusal)
 
 
 def test_pressure_somewhat_off_the_foot_is_a_warning() -> None:

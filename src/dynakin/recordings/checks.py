@@ -37,6 +37,9 @@ OVER_EDGE_M = 0.01
 trials that we have of which 11 kg are missing it is 18 and 27 mm, in the four that show the weight 0."""
 FREE_MOMENT_WARNING_M = 0.05
 """Free moment over vertical force: two feet twisting on the ground rarely exceed 10 N m at 400 N."""
+LYING_N, LYING = (200.0, 4000.0), 0.25
+"""Forces of so much on average while they are loaded, as people weigh (more is a unit or scale), and a vertical one of
+less than this part of it: friction allows no more across than 1.5 times the vertical."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,8 @@ def check_plates(
     frames = standing if standing is not None else slice(None)
     places = _feet(recording, ground, foot_markers or {}, findings)
     feet = {foot: place[:, :, [0, 2]] for foot, place in places.items()}
+    if lying := _lying(recording, ground):
+        return PlateCheck(None, None, tuple(findings.messages), lying)
     if mass_kg is None and (idle := _idle(recording, ground, feet, steps_kg)):
         findings.messages.append(idle)
         return PlateCheck(None, None, tuple(findings.messages), None, unused=idle.level == "warning")
@@ -133,6 +138,23 @@ def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame
     total = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))
     loaded = np.abs(np.nan_to_num(total[:, 1])) > JUDGED_N
     return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
+
+
+def _lying(recording: Recording, ground: GroundFrame) -> str | None:
+    """A sentence on forces that are large, and all across the vertical: they have other axes than the markers."""
+    total = np.nan_to_num(np.sum([plate.force for plate in recording.plates], axis=0))
+    size = np.linalg.norm(total, axis=1)
+    mean = total[size > 0.5 * size.max()].mean(axis=0) if size.max() > LYING_N[0] else np.zeros(3)
+    k = int(np.argmax(np.abs(mean)))
+    if not LYING_N[0] < np.abs(mean[k]) < LYING_N[1] or np.abs(ground.vectors_to_ground(mean)[1]) > LYING * np.abs(
+        mean[k]
+    ):
+        return None
+    axis = f"{'+' if mean[k] > 0.0 else '-'}{'XYZ'[k]}"
+    return (
+        f"the forces lie along {axis} ({abs(mean[k]):.0f} N on average while loaded), vertical is {ground.vertical}: "
+        "give the forces in the axes of the markers"
+    )
 
 
 def _idle(
