@@ -378,3 +378,38 @@ def test_a_seat_that_nobody_declared_is_no_zero_of_the_plates(data_dir: Path) ->
     ready = Estimator(load_model("fullbody", Subject(mass_kg=61.0))).prepare(chair)
     assert not about(ready.messages, "zero") and ready.ground.shear == NO_SHEAR
     assert np.isfinite(ready.wrench).all(axis=1).sum() > 700
+
+
+UPPER = ("Sternum", "C7", "Shoulder", "humerus", "elbow", "forearm", "wrist")
+
+
+def legs_of(recording: Recording) -> Recording:
+    """With the markers of legs and pelvis alone."""
+    kept = [k for k, name in enumerate(recording.marker_names) if not any(word in name for word in UPPER)]
+    names = tuple(recording.marker_names[k] for k in kept)
+    return replace(recording, markers=recording.markers[:, kept], marker_names=names)
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.02, 0.04, -0.06, 0.12])
+def test_legs_alone_show_plates_that_are_out_of_step_by_the_vertical_force(delay_s: float) -> None:
+    """By 30 ms a hip was up to 100 N m off, with nothing said."""
+    walk = legs_of(simulate("fullbody", "gait", 7, 4.0).recording)
+    said = about(person().prepare(brought_into_step(walk, -delay_s)).messages, "in step")
+    assert [message.level for message in said] == ["warning"] * (abs(delay_s) > 0.025)
+    for message in said:
+        (found,) = re.findall(r"([0-9.]+) ms (?:behind|ahead of) the markers", message.text)
+        assert float(found) == pytest.approx(1000.0 * abs(delay_s), abs=10.0)
+        assert ("behind" in message.text) == (delay_s > 0.0)
+
+
+def test_legs_alone_whose_movement_hides_the_clock_say_so() -> None:
+    """A force that nothing explains, as large as that of the movement."""
+    walk = legs_of(simulate("fullbody", "gait", 7, 4.0).recording)
+    ready = person().prepare(walk)
+    total = ready.wrench[:, :3].copy()
+    needed = Needed(ready.calibrated, walk.time, ready.markers)
+    assert not needed.whole and not plate_motion.hides_clock(needed, total)
+    total[:, 1] += 100.0 * np.sin(2.0 * np.pi * 1.5 * walk.time)
+    assert plate_motion.hides_clock(needed, total) and plates_delay(needed, total) is None
+    still = np.where(np.isfinite(total), [0.0, needed.weight, 0.0], np.nan)
+    assert not plate_motion.hides_clock(needed, still)

@@ -37,6 +37,10 @@ LEAST_S = 0.016
 """A lesser delay is left to `plate_clock`: skin and the model do as much to the centre of mass' acceleration.
 Recordings in step have their minimum at 0 to 6 ms (real, but for one at 15), walks of `truth3d` with joints found from
 markers 5 to 10 ms later than their plates are."""
+LONGEST_LEGS_S, LEAST_LEGS_S, COARSE_LEGS_S = 0.15, 0.025, 0.01
+"""The same of a body whose trunk no marker shows, by the vertical force alone: it needs no lean, and the trunk goes up
+and down with the pelvis. In step the minimum lies at 0 to 10 ms in 8 simulated walks and squats and 4 real recordings
+without their trunks' markers, at -10 in one whose whole body says 9, at 10 to 20 in 3 that have no others."""
 LESS = 0.75
 """So much less must the sum be off what the motion needs once it is in step; 0.12 to 0.76 where plates were moved by
 15 ms and more, 0.64 and more of recordings in step."""
@@ -73,13 +77,14 @@ class Needed:
     Attributes:
         time: (T,) s. rate: Hz. weight: N, with what is carried.
         force: (T, 3) N, ground axes. known: (T,) frames in which it is. whole: all of the body is marked.
-        root: (T, 3) m, `root_path`.
+        root: (T, 3) m, `root_path`. coarse_s: standard deviation of a delay that it shows.
     """
 
     def __init__(self, initial: CalibratedModel, time: Array, markers: Array) -> None:
         found = mass_centre(initial, time, markers)
         self.time, self.rate, self.weight = time, rate_of(time), initial.weighed_kg * GRAVITY_M_S2
         self.whole, self.root = not initial.unseen_kg, root_path(initial, markers)
+        self.coarse_s = COARSE_S if self.whole else COARSE_LEGS_S
         self.known: Flags = np.zeros(len(time), dtype=bool) if found is None else found.known
         self.force = np.zeros((len(time), 3)) if found is None else found.needed_force(initial.weighed_kg)
 
@@ -113,17 +118,40 @@ class Needed:
 def plates_delay(needed: Needed, force: Array) -> float | None:
     """By how much plates lag, s, whose sum (T, 3) N is known where it is no NaN; None where they are in step, or
     nothing can be said."""
-    delays = np.arange(-LONGEST_S, LONGEST_S + 0.5 * STEP_S, STEP_S)
-    moved = [_later(needed.time, force, delay) for delay in delays]
-    misfits = np.array([needed.misfit(each) for each in moved])
+    delays, misfits, judged = _misfits(needed, force)
     k, now = int(np.argmin(misfits)), misfits[len(delays) // 2]
     if not 0 < k < len(delays) - 1 or not np.isfinite(misfits[k - 1 : k + 2]).all():
         return None
     before, least, after = misfits[k - 1 : k + 2]
     delay = float(delays[k] + 0.5 * STEP_S * (before - after) / max(before - 2.0 * least + after, 1e-12))
-    if abs(delay) < LEAST_S or least > LESS * now or least > NEAR * needed.weight:
+    shortest = LEAST_S if needed.whole else LEAST_LEGS_S
+    if abs(delay) < shortest or least > LESS * now or least > NEAR * needed.weight:
         return None
-    return delay if needed.judged_s(moved[k]) > KEPT * needed.judged_s(force) else None
+    return delay if judged[k] > KEPT * needed.judged_s(force) else None
+
+
+def hides_clock(needed: Needed, force: Array) -> bool:
+    """Whether a body without its trunk's markers moves, and yet no delay of its plates would be found."""
+    known = needed.judged(force)
+    if needed.whole or not needed.judged_s(force) >= _SHORTEST_S:
+        return False
+    if force[known, 1].std() < VIGOROUS * needed.weight:
+        return False
+    _, misfits, _ = _misfits(needed, force)
+    middle, by = len(misfits) // 2, round(2.0 * LEAST_LEGS_S / STEP_S)
+    least, aside = misfits.min(), min(misfits[middle - by], misfits[middle + by])
+    return bool(least > LESS * aside or least > NEAR * needed.weight)
+
+
+def _misfits(needed: Needed, force: Array) -> tuple[Array, Array, list[float]]:
+    """Delays, s, the misfit of forces (T, 3) that are taken so much later, and how long it was judged."""
+    longest = LONGEST_S if needed.whole else LONGEST_LEGS_S
+    delays = np.arange(-longest, longest + 0.5 * STEP_S, STEP_S)
+    moved = [_later(needed.time, force, delay) for delay in delays]
+    if not needed.whole:
+        for each in moved:
+            each[:, [0, 2]] = np.where(np.isfinite(each[:, [1]]), needed.force[:, [0, 2]], np.nan)
+    return delays, np.array([needed.misfit(each) for each in moved]), [needed.judged_s(each) for each in moved]
 
 
 def out_of_step_in_words(delay_s: float, sd_s: float) -> str:

@@ -17,10 +17,10 @@ from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
 from dynakin.filter.plate_clock import Delay, clock_delay
 from dynakin.filter.plate_motion import (
-    COARSE_S,
     Needed,
     brought_into_step,
     fitting_rate,
+    hides_clock,
     out_of_step_in_words,
     plates_delay,
     turned_axes,
@@ -54,6 +54,7 @@ UNJUDGED = (
     "The recording is too short, or shows too few markers, to check by the motion of the centre of mass that the "
     "plates carry the person."
 )
+CLOCK_HIDDEN = "Not all of the body is marked: this movement does not show whether plates and markers are in step."
 MANY = 0.2
 """Part of the frames from which it is said that they could not be checked; the ends of a recording never can."""
 _NEARLY_ALL = 0.8
@@ -167,7 +168,10 @@ def _known_ground(
         total = np.where(loads.total_known[:, None], wrench[:, :3], np.nan)
         delay = None if in_step else plates_delay(needed, total)
         if delay is not None:
-            return _brought_into_step(recording, initial, markers, Delay(delay, COARSE_S), assigned, tolerance)
+            coarse = Delay(delay, needed.coarse_s)
+            return _brought_into_step(recording, initial, markers, coarse, assigned, tolerance)
+        if not in_step and hides_clock(needed, total):
+            by_motion.append(note("sum of the plates", CLOCK_HIDDEN))
         found = None if initial.contacts else fitting_rate(needed, total)
         if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
             by_motion.append(warning("rate", wrong_rate_in_words(needed.rate, *found)))
@@ -327,7 +331,12 @@ def _brought_into_step(
     wrench = initial.ground.wrench_to_ground(there.total_wrench())
     ground, known = _known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
     words = f"{out_of_step_in_words(*delay)}; they were brought into step."
-    return replace(ground, notes=(note("in step", words), *ground.notes), behind_s=delay.delay_s), known
+    said = note("in step", words)
+    if initial.unseen_kg:
+        said = warning(
+            "in step", f"{words} Not all of the body is marked, so that no better is known: synchronise both."
+        )
+    return replace(ground, notes=(said, *ground.notes), behind_s=delay.delay_s), known
 
 
 def _nearly_all(found: Closure) -> bool:

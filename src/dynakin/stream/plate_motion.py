@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.plate_motion import Needed, plates_delay, turned_axes
+from dynakin.filter.plate_motion import COARSE_S, Needed, plates_delay, turned_axes
 from dynakin.filter.total_wrench import doubtful_mass
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -38,7 +38,8 @@ class LivePlateMotion:
 
     Attributes:
         delay_s: by how much the plates lag behind the markers as they come now, s; None where that is not known or they
-            are in step. turned, mass: sentences where their axes are others, where they carry another mass.
+            are in step. coarse_s: its standard deviation.
+        turned, mass: sentences where their axes are others, where they carry another mass.
     """
 
     def __init__(self, initial: CalibratedModel, plates: Sequence[str]) -> None:
@@ -47,6 +48,7 @@ class LivePlateMotion:
         self._asked_s: float | None = None
         self._every_s = FIRST_S
         self.delay_s: float | None = None
+        self.coarse_s = COARSE_S
         self.turned: str | None = None
         self.mass: Message | None = None
 
@@ -91,7 +93,7 @@ class LivePlateMotion:
         up = axis_vector(self._initial.ground.vertical)
         plates = [floor_plate(name, wrenches[:, p], up) for p, name in enumerate(self._plates)]
         self.turned = turned_axes(needed, plates, self._initial, known, _REMEDY)
-        self.delay_s = None if self.turned else plates_delay(needed, total)
+        self.delay_s, self.coarse_s = None if self.turned else plates_delay(needed, total), needed.coarse_s
         ratio = float(total[judged, 1].mean() / needed.force[judged, 1].mean())
         foreign = float(np.mean(~whole[known]))
         if not foreign:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dynakin.blas import one_blas_thread
 from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.plate_motion import COARSE_S, out_of_step_in_words
+from dynakin.filter.plate_motion import out_of_step_in_words
 from dynakin.filter.samples import Sample
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, about, warning, warnings_of
@@ -403,7 +403,7 @@ class Live:
             self._plate_motion = None
         elif asked.delay_s is not None:
             self.fusion.plates_behind_s += asked.delay_s
-            found = out_of_step_in_words(asked.delay_s, COARSE_S)
+            found = out_of_step_in_words(asked.delay_s, asked.coarse_s)
             self.say(f"{found}; from {time_s:.2f} s on they are brought into step.")
         if asked.mass is not None and not self._mass_doubted:
             self._mass_doubted = True
