@@ -555,3 +555,16 @@ def test_a_joint_of_which_a_rotation_is_held_is_the_joint_that_it_was() -> None:
     seen = [set(JointErrors.of(model, np.zeros(10), held).kinds) for held in ((), ("turn",))]
     assert "pair_axes" in seen[0] and "pair_axes" not in seen[1]
     assert {"ball_axes", "ball_centre"} <= seen[1] and not {"ball_axes", "ball_centre"} & seen[0]
+
+
+def test_a_clock_that_is_known_worse_counts_for_more() -> None:
+    subject = Systematic(calibrated(), Noise())
+    assert subject.with_clock(0.5 * subject.sizes.clock) is subject
+    coarse = subject.with_clock(0.01)
+    assert coarse.sizes == replace(subject.sizes, clock=0.01) and subject.sizes.clock < 0.01
+    own = dict.fromkeys(BLOCKS, np.zeros(10))
+    state = (own, np.r_[Q, QD, QDD], np.zeros((30, 30)), CONTACT[None], ["shank"])
+    surer, less = (each.added(*state, late=True, wrench_rate=RATE[None])["moments"] for each in (subject, coarse))
+    still = subject.added(*state, late=True, wrench_rate=np.zeros((1, 6)))["moments"]
+    by_clock = (less**2 - still**2) / (surer**2 - still**2)
+    np.testing.assert_allclose(by_clock[surer > 1.001 * still], (0.01 / subject.sizes.clock) ** 2)
