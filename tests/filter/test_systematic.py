@@ -569,3 +569,16 @@ def test_of_a_heavy_person_the_tables_are_not_believed_and_that_is_said() -> Non
     assert said.level == "warning" and "100 kg at 1.70 m (35 kg/m2)" in said.text
     for other in (replace(heavy, height_m=None), replace(heavy, plan=None)):
         assert not other.heavy and other.unlike_the_tables() == []
+
+
+def test_a_clock_that_is_known_worse_counts_for_more() -> None:
+    subject = Systematic(calibrated(), Noise())
+    assert subject.with_clock(0.5 * subject.sizes.clock) is subject
+    coarse = subject.with_clock(0.01)
+    assert coarse.sizes == replace(subject.sizes, clock=0.01) and subject.sizes.clock < 0.01
+    own = dict.fromkeys(BLOCKS, np.zeros(10))
+    state = (own, np.r_[Q, QD, QDD], np.zeros((30, 30)), CONTACT[None], ["shank"])
+    surer, less = (each.added(*state, late=True, wrench_rate=RATE[None])["moments"] for each in (subject, coarse))
+    still = subject.added(*state, late=True, wrench_rate=np.zeros((1, 6)))["moments"]
+    by_clock = (less**2 - still**2) / (surer**2 - still**2)
+    np.testing.assert_allclose(by_clock[surer > 1.001 * still], (0.01 / subject.sizes.clock) ** 2)

@@ -320,10 +320,11 @@ class Estimator:
             notes += [place] if place else []
         if tracker.systematic is not None:
             notes += tracker.systematic.misfit(arrays["state"][-1])
+        systematic = tracker.systematic and tracker.systematic.with_clock(ground.clock_sd_s)
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(
             arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances,
-            tracker.noise, on_feet, ready.undeclared(on_feet), tracker.systematic, found_low_pass(recording),
+            tracker.noise, on_feet, ready.undeclared(on_feet), systematic, found_low_pass(recording),
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)
 

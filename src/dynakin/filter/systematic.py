@@ -8,6 +8,8 @@ afterwards and added to the filter's own variances ([derivations](derivations.md
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -105,6 +107,14 @@ class Systematic:
         self._inertia = [
             k for k, name in enumerate(calibrated.names) if self.sizes.inertia and name.startswith("inertia/")
         ]
+
+    def with_clock(self, sd_s: float) -> Systematic:
+        """The same, where the plates' clock is not known as well as in a walk whose segments are all marked."""
+        if not sd_s > self.sizes.clock:
+            return self
+        other = copy(self)
+        other.sizes = replace(self.sizes, clock=sd_s)
+        return other
 
     def _displacements(self, jacobian: Array) -> Array:
         """(3 M, S): what each source does to the markers of the model as it is posed."""

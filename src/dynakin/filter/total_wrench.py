@@ -74,7 +74,8 @@ class Ground:
         load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
         shear: by how much the plates' horizontal forces are off.
         notes: what there is to say. reasons: those of them that say why something is not measured.
-        behind_s: by how much the plates lagged behind the markers and were brought into step.
+        behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how well that
+            is known, where they were.
     """
 
     loads: FootLoads | None
@@ -86,6 +87,7 @@ class Ground:
     reasons: tuple[Message, ...]
     shear: Shear = NO_SHEAR
     behind_s: float = 0.0
+    clock_sd_s: float = 0.0
 
 
 def foot_markers(initial: CalibratedModel) -> dict[str, list[str]]:
@@ -357,7 +359,7 @@ def _brought_into_step(
         said = warning(
             "in step", f"{words} Not all of the body is marked, so that no better is known: synchronise both."
         )
-    return replace(ground, notes=(said, *ground.notes), behind_s=delay.delay_s), known
+    return replace(ground, notes=(said, *ground.notes), behind_s=delay.delay_s, clock_sd_s=delay.sd_s), known
 
 
 def _nearly_all(found: Closure) -> bool:
