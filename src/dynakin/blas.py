@@ -6,19 +6,21 @@ from __future__ import annotations
 from contextlib import ContextDecorator
 from threading import Lock
 
-import scipy.linalg  # noqa: F401  it and NumPy bring a BLAS each, which can be held to one thread once it is loaded
-from threadpoolctl import threadpool_limits
-
 
 class _OneThread(ContextDecorator):
     """For the whole process, since BLAS knows no other: from when the first of those who ask for it begins until the
-    last has ended, so that calls may be within one another and in several threads."""
+    last has ended, so that calls may be within one another and in several threads (where one thread ends what another
+    began, OpenBLAS stays with one)."""
 
     def __init__(self) -> None:
         self._lock = Lock()
         self._within = 0
 
     def __enter__(self) -> None:
+        # here, because only who computes waits for them; SciPy and NumPy bring a BLAS each, which must be loaded
+        import scipy.linalg  # noqa: F401
+        from threadpoolctl import threadpool_limits
+
         with self._lock:
             if not self._within:
                 self._limits = threadpool_limits(1, user_api="blas")
@@ -32,4 +34,5 @@ class _OneThread(ContextDecorator):
 
 
 one_blas_thread = _OneThread()
-"""``with one_blas_thread:`` or ``@one_blas_thread``."""
+"""``with one_blas_thread:`` or ``@one_blas_thread``: around runs, calibrations, comparisons, identification, tasks of
+studies and live sessions. A loop of one's own over `Tracker.step` is not held; its matrices are the core's."""

@@ -1,6 +1,7 @@
 """BLAS has one thread while dynakin works, and as many as before afterwards."""
 
 from collections.abc import Iterator
+from threading import Thread
 
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -23,12 +24,16 @@ def two_threads() -> Iterator[None]:
 
 
 def test_until_the_last_of_those_who_asked_for_it_has_ended() -> None:
-    one_blas_thread.__enter__()
-    one_blas_thread.__enter__()  # within the first, or in another thread
-    assert threads() == {1}
-    one_blas_thread.__exit__()
-    assert threads() == {1}
-    one_blas_thread.__exit__()
+    def elsewhere() -> None:
+        with one_blas_thread, one_blas_thread:
+            seen.update(threads())
+
+    seen: set[int] = set()
+    other = Thread(target=elsewhere)
+    with one_blas_thread:
+        other.start()
+        other.join()
+        assert seen == threads() == {1}
     assert threads() == {2}
 
 

@@ -97,6 +97,7 @@ def calibrated() -> Any:
         unmarked_joints=(),
         one_sided_joints=(),
         heavy=False,
+        own_inertia=False,
         spec=model,
         names=tuple(_core.Model(model).layout.names),
         x0=_core.Model(model).initial_state(),
@@ -567,6 +568,9 @@ def test_of_a_heavy_person_the_tables_are_not_believed_and_that_is_said() -> Non
     assert wide.mass_centre >= 2.0 * LANDMARKS.mass_centre and wide.skin >= 1.5 * LANDMARKS.skin
     (said,) = heavy.unlike_the_tables()
     assert said.level == "warning" and "100 kg at 1.70 m (35 kg/m2)" in said.text
+    identified = replace(heavy, own_inertia=True)
+    assert identified.unlike_the_tables() == []
+    assert usual_sizes(identified) == replace(LANDMARKS, skin=wide.skin)
     for other in (replace(heavy, height_m=None), replace(heavy, plan=None)):
         assert not other.heavy and other.unlike_the_tables() == []
 

@@ -395,4 +395,6 @@ def test_a_few_refused_frames_take_no_stance_out_of_the_count() -> None:
         data["moment_source"][refused, 0] = DERIVED
         found = counted(replace(walker, data=data), np.ones(301, dtype=bool))
         assert bool(found[:, 0].all()) is bridged
+        data["moment_source"][refused, 0] = ABSENT
+        assert not counted(replace(walker, data=data), np.ones(301, dtype=bool))[refused, 0].any()
         np.testing.assert_array_equal(found[:, 1:], everything[:, 1:])

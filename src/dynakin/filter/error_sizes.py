@@ -123,9 +123,10 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     if calibrated.plan is None:
         return SCALED
     sizes = UNMARKED if calibrated.unmarked_joints else LANDMARKS
-    if calibrated.heavy:
-        return replace(sizes, mass_centre=HEAVY_CENTRE * sizes.mass_centre, skin=HEAVY_SKIN * sizes.skin)
-    return sizes
+    if not calibrated.heavy:
+        return sizes
+    farther = 1.0 if calibrated.own_inertia else HEAVY_CENTRE
+    return replace(sizes, mass_centre=farther * sizes.mass_centre, skin=HEAVY_SKIN * sizes.skin)
 
 
 def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:

@@ -146,8 +146,7 @@ class Estimator:
         )
         if self.parameters is not None:
             calibrated = with_identified(calibrated, self.parameters)
-        else:
-            calibrated = replace(calibrated, messages=(*calibrated.messages, *calibrated.unlike_the_tables()))
+        calibrated = replace(calibrated, messages=(*calibrated.messages, *calibrated.unlike_the_tables()))
         return with_contacts(with_loads(calibrated, self.loads), self.contacts)
 
     def start(

@@ -124,8 +124,8 @@ def known_ground(
     """
     ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance)
     left = clock_delay(initial, recording.time, markers, known) if ground.loads is not None else None
-    if left is None or not left.worth_it:
-        return ground, known
+    if left is None or not left.worth_it:  # the coarse search's deviation gives way to the finer one's
+        return (replace(ground, clock_sd_s=left.sd_s) if left is not None and ground.behind_s else ground), known
     delay = Delay(ground.behind_s + left.delay_s, left.sd_s)
     return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
 

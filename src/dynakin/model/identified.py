@@ -275,5 +275,6 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
         lower=lower,
         upper=upper,
         joint_prior=found if initial.joint_prior is None else initial.joint_prior.with_known(found),
+        own_inertia=True,
         messages=(*initial.messages, *messages),
     )

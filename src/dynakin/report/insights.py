@@ -19,7 +19,12 @@ def in_short(found: list[Insight]) -> str:
     return f"{sentence(plural(len(titles), 'finding'))} to look at before using this run: {listed(titles, 8)}."
 
 
-OF_FORCES: frozenset[Topic] = frozenset({"weight", "mass", "height", "sex", "plates", "sum of the plates", "in step"})
+OF_FORCES: frozenset[Topic] = frozenset(
+    {
+        *("weight", "mass", "height", "sex", "carried"),
+        *("plates", "sum of the plates", "in step", "rate", "place", "zero", "gain"),
+    }
+)
 """Topics of warnings after which a trial's forces, or the mass that they are compared with, may be wrong."""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from dynakin.blas import one_blas_thread
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.base import base_of, identified_alone, in_no_base_parameter
 from dynakin.identification.observability.element_words import base_words, gauges_in_words, inertia_words, is_planar
@@ -61,6 +62,7 @@ class Structure:
         }
 
 
+@one_blas_thread
 def structure_of(tracker: Tracker) -> Structure:
     """Base parameters and gauges of a tracker's model."""
     measured = MeasuredModel.of(tracker)

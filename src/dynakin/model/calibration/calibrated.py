@@ -111,6 +111,7 @@ class CalibratedModel(StartingState):
         skin_lasts: how many times longer skin stays displaced than the noise settings say of a floating model.
         dimensionless: geometry parameters that are factors, not lengths.
         carried_kg: mass of the known loads (`model.calibration.loads`), not in ``mass_kg``.
+        own_inertia: whether inertia was identified of this person, and is not the table's.
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
         held: coordinate -> why nothing shows it, where it is held at an angle for lack of markers: results have none.
         guessed_places: whether the places of the markers were guessed, because no marker set has their names.
@@ -140,6 +141,7 @@ class CalibratedModel(StartingState):
     skin_lasts: float = 1.0
     dimensionless: frozenset[str] = frozenset()
     carried_kg: float = 0.0
+    own_inertia: bool = False
     unmarked_kg: float = 0.0
     held: dict[str, str] = field(default_factory=dict)
     guessed_places: bool = False
@@ -158,8 +160,8 @@ class CalibratedModel(StartingState):
         return self.mass_kg > HEAVY_KG_M2 * self.height_m**2
 
     def unlike_the_tables(self) -> list[Message]:
-        """A warning where the inertia tables are not for this person."""
-        if not self.heavy or self.height_m is None:
+        """A warning where the inertia is a table's that is not for this person."""
+        if not self.heavy or self.own_inertia or self.height_m is None:
             return []
         index = self.mass_kg / self.height_m**2
         text = (

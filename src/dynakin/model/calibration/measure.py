@@ -146,7 +146,7 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
         ground = trials.trial.ground
         other, _ = against_vertical(asked.recording, ground.vertical, trials.trial.match.facing_pairs)
         why = f"; vertical is {ground.vertical}, but the markers show {other}" if other else ""
-        raise ModelError(f"{error.message}{why}") from None
+        raise ModelError(f"{error.message}{why}", asks_for=error.asks_for) from None
     if subject.sex is None:
         messages.append(
             note(
@@ -286,7 +286,7 @@ def _landmarks(
         found = completed(model, asked.table, marked.locks, legs.landmarks, standing, height_m, still.trial.match.where)
     except ModelError as error:
         reasons = dict.fromkeys(source.match.left_out.values())
-        raise ModelError("; ".join([error.message, *reasons])) from None
+        raise ModelError("; ".join([error.message, *reasons]), asks_for=error.asks_for) from None
     if still.stands:
         messages += check_standing(found.landmarks, source.recording.name, given=asked.static is not None)
     supposed = supposed_legs(found, legs, marked.chosen)

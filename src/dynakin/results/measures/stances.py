@@ -73,12 +73,14 @@ def compared_stances(estimate: Estimate, window: Flags) -> dict[str, list[slice]
 
 def counted(estimate: Estimate, window: Flags) -> Flags:
     """(T, C) frames in which a moment counts: all of the window where it is measured throughout; of a leg else the
-    stances and swings that are whole and measured in every frame, if there is a stance among them; of anything else
-    none."""
-    measured = sources.moment_sources(estimate.data) == sources.MEASURED
+    stances and swings that are whole and measured in every frame (but for `BRIDGED_S`), if there is a stance among
+    them; of anything else none."""
+    codes = sources.moment_sources(estimate.data)
+    measured = codes == sources.MEASURED
     for first, end in runs(sources.plates_refused(estimate.data)):
         if first > 0 and end < len(measured) and (end - first) * step_of(estimate.time) <= BRIDGED_S:
-            measured[first:end] |= measured[first - 1] & measured[end]
+            beside = measured[first - 1] & measured[end]
+            measured[first:end] |= beside & (codes[first:end] == sources.DERIVED)
     found = np.zeros(measured.shape, dtype=bool)
     found[window] = measured[window].all(axis=0)
     legs = sources.legs_of(estimate.data)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from dynakin.blas import one_blas_thread
 from dynakin.errors import DynakinError
 from dynakin.progress import silent
 
@@ -46,6 +47,7 @@ class Outcome:
     failure: Failure | None = None
 
 
+@one_blas_thread
 def attempt(function: Function, shared: Any, task: Task) -> Outcome:
     """Work on one task where it lands; its errors come back as values, so that none stops another task."""
     try:
