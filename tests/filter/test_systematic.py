@@ -560,9 +560,26 @@ def test_a_joint_of_which_a_rotation_is_held_is_the_joint_that_it_was() -> None:
     assert {"ball_axes", "ball_centre"} <= seen[1] and not {"ball_axes", "ball_centre"} & seen[0]
 
 
+def test_a_pelvis_is_as_sure_whichever_way_the_person_faces() -> None:
+    """Its tilt and list are about axes of the laboratory: of who faces backwards both change sign, with their zero."""
+    standing = measured()
+    heading = standing.names.index("pelvis_rotation")
+    said = []
+    for turn in (0.0, np.pi, 0.5 * np.pi):
+        x0 = standing.x0.copy()
+        x0[heading] += turn
+        found = Systematic(replace(standing, x0=x0), Noise())
+        q = found._reference + 0.05 * np.sin(np.arange(len(found._reference)))
+        still = np.zeros_like(q)
+        root = found.parts(q, still, still)["root"]["coordinates"]
+        said.append(root[[standing.names.index(name) for name in ("hip_flexion_r", "knee_angle_r")]])
+        assert (root < 0.3).all()
+    np.testing.assert_allclose(said[1:], [said[0]] * 2, rtol=0.1)
+
+
 def test_of_a_heavy_person_the_tables_are_not_believed_and_that_is_said() -> None:
     """Unless identified parameters take the tables' place; an .osim has bodies of its own."""
-    usual, heavy = measured(), replace(measured(), mass_kg=100.0, height_m=1.7)
+    usual, heavy = measured(), replace(measured(), mass_kg=100.0, height_m=1.7, height_stated=True)
     assert usual_sizes(usual) == LANDMARKS and usual.unlike_the_tables() == []
     wide = usual_sizes(heavy)
     assert wide.mass_centre >= 2.0 * LANDMARKS.mass_centre and wide.skin >= 1.5 * LANDMARKS.skin
@@ -571,7 +588,7 @@ def test_of_a_heavy_person_the_tables_are_not_believed_and_that_is_said() -> Non
     identified = replace(heavy, own_inertia=True)
     assert identified.unlike_the_tables() == []
     assert usual_sizes(identified) == replace(LANDMARKS, skin=wide.skin)
-    for other in (replace(heavy, height_m=None), replace(heavy, plan=None)):
+    for other in (replace(heavy, height_stated=False), replace(heavy, height_m=None), replace(heavy, plan=None)):
         assert not other.heavy and other.unlike_the_tables() == []
 
 

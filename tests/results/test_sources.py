@@ -31,6 +31,7 @@ from dynakin.results.measures.sources import (
     measured_moments,
     moment_figures,
     moment_sources,
+    refused_for_long,
 )
 from dynakin.results.measures.stances import counted, phases
 from dynakin.results.measures.tracking import without_lost
@@ -382,19 +383,11 @@ def test_the_console_says_every_warning_once_under_the_verdict_and_the_mass_firs
     assert in_short([first, *others]).split(": ")[1].startswith("mass")
 
 
-def test_a_few_refused_frames_take_no_stance_out_of_the_count() -> None:
-    """Plates that were refused for 50 ms at most: what stands beside them is measured all the same."""
-    walker = make_walker()
-    everything = counted(walker, np.ones(301, dtype=bool))
-    for frames, bridged in ((4, True), (8, False)):
-        data = walker.data.copy(deep=True)
-        refused = slice(150, 150 + frames)
-        verdict = np.zeros((301, data.sizes.get("marker", 0) + 1), dtype=np.uint8)
-        verdict[refused, -1] = REFUSED
-        data["verdict"] = (("time", "sensor"), verdict)
-        data["moment_source"][refused, 0] = DERIVED
-        found = counted(replace(walker, data=data), np.ones(301, dtype=bool))
-        assert bool(found[:, 0].all()) is bridged
-        data["moment_source"][refused, 0] = ABSENT
-        assert not counted(replace(walker, data=data), np.ones(301, dtype=bool))[refused, 0].any()
-        np.testing.assert_array_equal(found[:, 1:], everything[:, 1:])
+def test_a_few_refused_frames_rest_on_the_plates_beside_them() -> None:
+    """For 50 ms at most, and not where no others are beside them."""
+    for first, end, stay in ((150, 154, False), (150, 156, True), (0, 2, True), (299, 301, True)):
+        verdict = np.zeros((301, 2), dtype=np.uint8)
+        verdict[first:end, -1] = REFUSED
+        data = xr.Dataset({"verdict": (("time", "sensor"), verdict)}, coords={"time": 0.01 * np.arange(301)})
+        assert refused_for_long(data).any() == stay
+        assert not refused_for_long(data)[verdict[:, -1] != REFUSED].any()

@@ -21,6 +21,7 @@ from dynakin.results.measures.sources import (
     contact_sources,
     out_of_sight,
     plates_refused,
+    refused_for_long,
     too_long,
 )
 
@@ -46,9 +47,9 @@ def with_sources(
 
     A load is as good as the worst of the contacts behind its joint (`contact_sources`). Where something undeclared
     bears the person, it may touch any segment but those between the feet and the thighs, and a foot on no plate: what
-    lies there, or has such a foot behind it, is absent. Where the plates were refused nothing that stands on them is
-    measured: it is derived. A model that stands on its root has the plates' sum behind every joint: without it, too,
-    all is derived, or absent where undeclared.
+    lies there, or has such a foot behind it, is absent. Where the plates were refused (`refused_for_long`) nothing that
+    stands on them is measured: it is derived. A model that stands on its root has the plates' sum behind every joint:
+    without it, too, all is derived, or absent where undeclared.
 
     Args:
         data: with the joints' tree and, of floating models, the core's ``moment_source``.
@@ -66,7 +67,8 @@ def with_sources(
     segments = [str(name) for name in data["joint_segment"].values]
     parents = data["joint_parent"].values
     moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
-    blind, refused = np.isnan(values_of(data, "wrench_measured")).all(axis=1), plates_refused(data)
+    blind = np.isnan(values_of(data, "wrench_measured")).all(axis=1)
+    refused = plates_refused(data) if feet is None else refused_for_long(data)
     if feet is None:
         codes = np.where(blind | refused, DERIVED, MEASURED)[:, None]
         joints, moments = np.tile(codes, (1, len(segments))), np.tile(codes, (1, len(moved)))

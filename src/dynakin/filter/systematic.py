@@ -428,11 +428,18 @@ def followed(q: Array, calibrated: CalibratedModel) -> Array:
 
 
 def neutral(calibrated: CalibratedModel) -> Array:
-    """(C,) upright posture: all free coordinates 0, or as near to it as their bounds allow."""
-    q = np.array([c.value for c in calibrated.spec.coordinates], dtype=float)
-    free = free_coordinates(calibrated.spec)
+    """(C,) upright posture: all free coordinates 0, or as near to it as their bounds allow; of the heading with which
+    the person starts, because a pelvis' tilt and list are about axes of the laboratory."""
+    spec = calibrated.spec
+    q = np.array([c.value for c in spec.coordinates], dtype=float)
+    free = free_coordinates(spec)
     K = len(free)
     q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
+    axes = [axis for segment in spec.segments if floats(segment) for axis in segment.axes]
+    turns = {axis.coordinate for axis in axes if axis.kind == "rotation" and axis.direction[1]}
+    for k, place in enumerate(free):
+        if spec.coordinates[place].name in turns:
+            q[place] = calibrated.x0[k]
     return q
 
 

@@ -235,6 +235,7 @@ class ModelDefinition:
             side=rest.side,
             mass_kg=rest.mass_kg,
             height_m=rest.height_m,
+            height_stated=any([self.subject.height_m, *(r.subject.get("height_m") for r in (recording, static) if r)]),
             parts=rest.parts,
             messages=tuple(messages),
             plan=plan,

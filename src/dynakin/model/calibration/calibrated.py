@@ -111,6 +111,7 @@ class CalibratedModel(StartingState):
         skin_lasts: how many times longer skin stays displaced than the noise settings say of a floating model.
         dimensionless: geometry parameters that are factors, not lengths.
         carried_kg: mass of the known loads (`model.calibration.loads`), not in ``mass_kg``.
+        height_stated: whether the height is somebody's word, and not estimated from markers.
         own_inertia: whether inertia was identified of this person, and is not the table's.
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
         held: coordinate -> why nothing shows it, where it is held at an angle for lack of markers: results have none.
@@ -141,6 +142,7 @@ class CalibratedModel(StartingState):
     skin_lasts: float = 1.0
     dimensionless: frozenset[str] = frozenset()
     carried_kg: float = 0.0
+    height_stated: bool = False
     own_inertia: bool = False
     unmarked_kg: float = 0.0
     held: dict[str, str] = field(default_factory=dict)
@@ -155,7 +157,7 @@ class CalibratedModel(StartingState):
     def heavy(self) -> bool:
         """Whether the person is heavier for the height than those of the inertia tables: their trunk's centre of mass
         is not this person's."""
-        if self.plan is None or self.height_m is None:
+        if self.plan is None or self.height_m is None or not self.height_stated:
             return False
         return self.mass_kg > HEAVY_KG_M2 * self.height_m**2
 

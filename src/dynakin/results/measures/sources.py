@@ -104,6 +104,20 @@ def contact_sources(contact: Codes, undeclared: npt.NDArray[np.bool_] | None = N
     return np.where(contact == SHARED_PLATE, PRIOR, codes).astype(np.uint8)
 
 
+BRIDGED_S = 0.05
+"""A stretch of frames whose plates were refused, at most, that rests on the plates before and after it: one frame of
+215 took peaks, work and symmetry of a good walk with it."""
+
+
+def refused_for_long(data: xr.Dataset) -> npt.NDArray[np.bool_]:
+    """(T,) frames whose plates were refused, without such stretches of `BRIDGED_S` at most between others."""
+    time, refused = np.asarray(data["time"].values), plates_refused(data)
+    for first, end in runs(refused):
+        if first > 0 and end < len(time) and time[end] - time[first] <= BRIDGED_S + 1e-9:
+            refused[first:end] = False
+    return refused
+
+
 def plates_refused(data: xr.Dataset) -> npt.NDArray[np.bool_]:
     """(T,) frames whose plates were refused: no number of the estimate rests on them."""
     if "verdict" not in data:

@@ -2,7 +2,7 @@
 
 The peak of the measured part of a stance need not be the stance's, and the impulse of a part is no impulse. So where
 some of a leg's moments are not measured, only those of its stances (touch-down to toe-off) and swings count that are
-measured in every frame, but for a few of which the plates were refused.
+measured in every frame.
 """
 
 from __future__ import annotations
@@ -13,17 +13,11 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE
-from dynakin.recordings.times import step_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
 
 Flags = npt.NDArray[np.bool_]
-
-BRIDGED_S = 0.05
-"""A stretch of frames whose plates were refused, at most, that takes no stance out of the count: one frame of 215 took
-66 figures of a good walk with it."""
 
 
 @dataclass(frozen=True)
@@ -73,14 +67,9 @@ def compared_stances(estimate: Estimate, window: Flags) -> dict[str, list[slice]
 
 def counted(estimate: Estimate, window: Flags) -> Flags:
     """(T, C) frames in which a moment counts: all of the window where it is measured throughout; of a leg else the
-    stances and swings that are whole and measured in every frame (but for `BRIDGED_S`), if there is a stance among
+    stances and swings that are whole and measured in every frame, if there is a stance among
     them; of anything else none."""
-    codes = sources.moment_sources(estimate.data)
-    measured = codes == sources.MEASURED
-    for first, end in runs(sources.plates_refused(estimate.data)):
-        if first > 0 and end < len(measured) and (end - first) * step_of(estimate.time) <= BRIDGED_S:
-            beside = measured[first - 1] & measured[end]
-            measured[first:end] |= beside & (codes[first:end] == sources.DERIVED)
+    measured = sources.moment_sources(estimate.data) == sources.MEASURED
     found = np.zeros(measured.shape, dtype=bool)
     found[window] = measured[window].all(axis=0)
     legs = sources.legs_of(estimate.data)
