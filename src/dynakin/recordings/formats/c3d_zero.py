@@ -25,8 +25,8 @@ def zero_frames(parameters: Parameters, frames: int) -> slice | None:
 def zeroed(
     name: str, channels: Array, force: Array, frames: slice | None, markers: Array, corners: Array, normal: Array
 ) -> tuple[Array, list[Message]]:
-    """Channels (C, N) of a plate with their mean over these frames taken off, unless something may press on it then; and
-    what there is to say of it.
+    """Channels (C, N) of a plate with their mean over these frames taken off, unless something may press on it then;
+    and what there is to say of it.
 
     Args:
         force: (N, 3) N, of the plate as it is. markers: (T, M, 3) m. corners: (4, 3) m, of the plate. normal: (3,) of
