@@ -242,7 +242,7 @@ def test_a_long_plate_is_shared_in_double_support_wherever_a_recording_begins_an
 
 @pytest.mark.parametrize(("early", "shift_m"), [(0, 0.0), (6, -0.6), (6, 0.6)])
 def test_the_order_of_the_plates_changes_nothing(early: int, shift_m: float) -> None:
-    """Each foot on two plates at once, loaded before it is seen to stand, on the one of them beside it while lightly."""
+    """Each foot on two plates at once, loaded before it is seen to stand, on one of them beside it while lightly."""
     feet = {
         side: [replace(s, plates=(f"{side} {k} back", f"{side} {k} front")) for k, s in enumerate(own)]
         for side, own in walk(4, 0.6).items()

@@ -39,7 +39,8 @@ FREE_MOMENT_WARNING_M = 0.05
 """Free moment over vertical force: two feet twisting on the ground rarely exceed 10 N m at 400 N."""
 LYING_N, LYING = (200.0, 4000.0), 0.25
 """Forces of so much on average while they are loaded, as people weigh (more is a unit or scale), and a vertical one of
-less than this part of it: friction allows no more across than 1.5 times the vertical."""
+less than this part of it: a force across the vertical is at most 1.5 times as large as that by friction
+(`limits`), 4 times leaves room for plates that are tilted or drift, and other axes make it tens of times."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,8 @@ def check_plates(
     frames = standing if standing is not None else slice(None)
     places = _feet(recording, ground, foot_markers or {}, findings)
     feet = {foot: place[:, :, [0, 2]] for foot, place in places.items()}
-    if lying := _lying(recording, ground):
+    given = () if loads is None else loads.given
+    if lying := _lying([plate for p, plate in enumerate(recording.plates) if p not in given], ground):
         return PlateCheck(None, None, tuple(findings.messages), lying)
     if mass_kg is None and (idle := _idle(recording, ground, feet, steps_kg)):
         findings.messages.append(idle)
@@ -140,9 +142,12 @@ def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame
     return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
 
 
-def _lying(recording: Recording, ground: GroundFrame) -> str | None:
-    """A sentence on forces that are large, and all across the vertical: they have other axes than the markers."""
-    total = np.nan_to_num(np.sum([plate.force for plate in recording.plates], axis=0))
+def _lying(plates: Sequence[Plate], ground: GroundFrame) -> str | None:
+    """A sentence on forces of the feet's plates that are large, and all across the vertical: they have other axes than
+    the markers. A declared contact may be pushed in any direction (a wall)."""
+    if not plates:
+        return None
+    total = np.nan_to_num(np.sum([plate.force for plate in plates], axis=0))
     size = np.linalg.norm(total, axis=1)
     mean = total[size > 0.5 * size.max()].mean(axis=0) if size.max() > LYING_N[0] else np.zeros(3)
     k = int(np.argmax(np.abs(mean)))
