@@ -160,7 +160,9 @@ def _known_ground(
     steps_kg = initial.weighed_kg if initial.feet and not initial.contacts else None
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads, steps_kg)
     if check.refusal:
-        raise RecordingError(f"{recording.plates_file}: {check.refusal}{_how_to_give(initial, loads)}")
+        raise RecordingError(
+            f"{recording.plates_file}: {check.refusal}{_how_to_give(initial, loads, check.under_no_foot)}"
+        )
     if check.unused:
         ground, nothing = _known_ground(recording.with_plates(()), initial, markers, np.full_like(wrench, np.nan))
         loads = ground.loads
@@ -246,12 +248,12 @@ def _taken_in_words(plate: str, contact: str) -> str:
     )
 
 
-def _how_to_give(initial: CalibratedModel, loads: FootLoads | None) -> str:
-    """What to do about a plate that is refused while a declared contact has none."""
+def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str | None) -> str:
+    """What to do about a plate that is refused for where it is pressed while a declared contact has none."""
     names = [name for name in initial.contacts if loads is not None and name not in loads.others]
-    if not names:
+    if not names or plate is None:
         return ""
-    return f'. If that plate bears the {names[0]}, say so in a configuration: plates = {{ "its name" = "{names[0]}" }}'
+    return f'. If {plate} bears the {names[0]}, say so in a configuration: plates = {{ "{plate}" = "{names[0]}" }}'
 
 
 class _Judged(NamedTuple):

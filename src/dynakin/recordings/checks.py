@@ -55,6 +55,7 @@ class PlateCheck:
         messages: sentences with numbers; warnings of what is wrong.
         refusal: why the plates cannot be used, None where they can. The caller decides what follows from it.
         unused: they carry nobody although a foot may be on them: a run does without them.
+        under_no_foot: name of the first plate that is refused for where it is pressed: it may be a contact's.
     """
 
     mass_kg_from_plates: float | None
@@ -62,6 +63,7 @@ class PlateCheck:
     messages: tuple[Message, ...]
     refusal: str | None
     unused: bool = False
+    under_no_foot: str | None = None
 
 
 def check_plates(
@@ -107,6 +109,7 @@ def check_plates(
     if steps_kg is not None:
         check_steps(recording, ground, steps_kg, loads, findings)
     under: dict[str, str] = {}
+    under_no_foot: str | None = None
     over_edge = standing is not None and _over_the_edge(recording, ground, loads, frames, findings)
     for p, plate in enumerate(recording.plates):
         if (beyond := beyond_limits(plate, recording, ground)) is not None:
@@ -120,7 +123,10 @@ def check_plates(
             findings.say(f"{plate.name} bears the {loads.given[p]}.")
             continue
         hidden = [name for name, own in (foot_markers or {}).items() if not own]
+        refused = len(findings.refusals)
         foot = _check_pressure(plate, loaded, feet, _owner(loads, loaded, p), ground, hidden, findings)
+        if len(findings.refusals) > refused:
+            under_no_foot = under_no_foot or plate.name
         _check_height(plate, loaded, places, recording.rate, ground, findings)
         _check_free_moment(plate, loaded, ground, findings)
         _check_level(plate, ground, findings)
@@ -132,7 +138,7 @@ def check_plates(
     standing_mass, mean_mass = (mass, None) if standing is not None else (None, mass)
     if over_edge:
         standing_mass = None
-    return PlateCheck(standing_mass, mean_mass, tuple(findings.messages), refusal)
+    return PlateCheck(standing_mass, mean_mass, tuple(findings.messages), refusal, under_no_foot=under_no_foot)
 
 
 def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame) -> slice | None:
