@@ -11,7 +11,7 @@ import numpy as np
 
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.contact import NEAR_M, foot_places
+from dynakin.recordings.feet.contact import COP_REFUSED_M, NEAR_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
@@ -22,9 +22,6 @@ from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.recordings.weight import TILT_WARNING_DEG, Findings, check_steps, check_weight, likely_unit, while_loaded
 
-COP_REFUSED_M = 0.30
-"""Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
-be wrong. From `NEAR_M` on it is said."""
 ABOVE_SURFACE_M = (-0.01, SHOE_M)
 """Height of a foot's lowest marker over the centre of pressure under it, in a quarter of its load: 17 to 78 mm in 18
 real recordings, 9 to 40 in simulated ones; a foot that shows nothing but an ankle, 0.1 m."""
