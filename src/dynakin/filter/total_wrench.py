@@ -233,10 +233,11 @@ def _loads_of_feet(
 
 
 def _declared_contacts(initial: CalibratedModel, markers: Array) -> tuple[Array, Flags]:
-    """(T, 1 + C, 3) m where the root and the declared contacts are; (T, C) frames in which each of these may bear."""
-    paths = ContactPaths.of(initial).at(markers)
+    """(T, 1 + C, 3) m where the root and the declared contacts are, NaN where none is declared; (T, C) frames in which
+    each of these may bear."""
     if not initial.contacts:
-        return paths, np.zeros((len(markers), 0), dtype=bool)
+        return np.full((len(markers), 1, 3), np.nan), np.zeros((len(markers), 0), dtype=bool)
+    paths = ContactPaths.of(initial).at(markers)
     floor = float(np.nanmin(markers[..., 1]))
     return paths, may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor)
 
