@@ -99,6 +99,15 @@ def test_frames_in_which_nobody_is_seen_are_no_zero(tmp_path: Path) -> None:
     assert len(said) == 1 and "was taken off as its zero" in said[0]
 
 
+def test_that_centres_of_pressure_have_no_zero_is_said(tmp_path: Path) -> None:
+    """Of type 1."""
+    off = np.add(PUSH, [[15.0], [-20.0], [-40.0], [0.0], [0.0], [0.0]])
+    force, said = zeroed(tmp_path / "a.c3d", off, (1, 20), {"PELVIS": PELVIS}, kind=1)
+    clean, _ = zeroed(tmp_path / "b.c3d", off, (), {"PELVIS": PELVIS}, kind=1)
+    np.testing.assert_array_equal(force, clean)
+    assert len(said) == 1 and "plate 1: its mean in frames 1 to 20" in said[0] and "was not taken off" in said[0]
+
+
 def test_a_plate_that_is_loaded_wherever_the_feet_are_is_to_be_zeroed() -> None:
     """It was refused for its place."""
     made = standing(70.0)

@@ -159,10 +159,11 @@ def _raw(
         notes.append(
             warning("plates", f"{name}: unknown unit {word!r} of its {_WORDS[signal]} in ANALOG:UNITS, {taken} taken.")
         )
-    zero = None if kind == 1 else zero_frames(parameters, len(markers))  # a mean of centres of pressure is no zero
+    zero = zero_frames(parameters, len(markers))
     origin = _origin(parameters, k, kind) * unit_m
     as_it_is, _ = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=factors)
-    signals, said = zeroed(name, analog[channels], as_it_is, zero, markers, corners, normal)
+    points = "point" in TYPES[kind].outputs
+    signals, said = zeroed(name, analog[channels], as_it_is, zero, markers, corners, normal, points=points)
     notes += said
     half_m = 0.5 * float(np.linalg.norm(corners[0] - corners[2]))
     if TYPES[kind].outputs.count("moment") == 3:

@@ -23,18 +23,30 @@ def zero_frames(parameters: Parameters, frames: int) -> slice | None:
 
 
 def zeroed(
-    name: str, channels: Array, force: Array, frames: slice | None, markers: Array, corners: Array, normal: Array
+    name: str,
+    channels: Array,
+    force: Array,
+    frames: slice | None,
+    markers: Array,
+    corners: Array,
+    normal: Array,
+    *,
+    points: bool,
 ) -> tuple[Array, list[Message]]:
     """Channels (C, N) of a plate with their mean over these frames taken off, unless something may press on it then;
     and what there is to say of it.
 
     Args:
         force: (N, 3) N, of the plate as it is. markers: (T, M, 3) m. corners: (4, 3) m, of the plate. normal: (3,) of
-            its surface, upwards.
+            its surface, upwards. points: the channels hold centres of pressure (type 1), which have no zero, and were
+            computed with that of the forces, or without it.
     """
     if frames is None:
         return channels, []
     which = f"frames {frames.start + 1} to {frames.stop} (FORCE_PLATFORM:ZERO in the file)"
+    if points:
+        text = f"{name}: its mean in {which} was not taken off: its channels hold centres of pressure (type 1)."
+        return channels, [note("plates", text)]
     per_frame = channels.shape[1] // len(markers)
     samples = slice(frames.start * per_frame, frames.stop * per_frame)
     if why := _in_use(force[samples], markers[frames], corners, normal):
