@@ -232,8 +232,12 @@ def test_a_foots_plate_is_not_taken_for_the_seats() -> None:
     under = estimator.prepare(at_a_distance(0.0))
     assert under.ground.loads is not None and not under.ground.loads.given
     assert any("plate 1 lies off its place" in message.text for message in warnings_of(under.messages))
-    with pytest.raises(RecordingError, match=r'plates = \{ "its name" = "seat" \}'):
+    with pytest.raises(RecordingError, match=r'If plate 1 bears the seat, .* plates = \{ "plate 1" = "seat" \}'):
         estimator.prepare(at_a_distance(0.8))
+    lying = [replace(plate, force=plate.force[:, [1, 0, 2]]) for plate in (foot, other)]
+    with pytest.raises(RecordingError, match="the forces lie along") as refused:  # no plate of its own is in question
+        estimator.prepare(recording.with_plates(tuple(lying)))
+    assert "bears the seat" not in str(refused.value)
 
 
 def test_contacts_of_a_configuration_come_back(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ import pytest
 from dynakin.errors import RecordingError
 from dynakin.recordings.formats import c3d
 from dynakin.recordings.formats.c3d import read_c3d
+from dynakin.recordings.formats.c3d_records import read_records
 from support.made_recordings import write_c3d
 
 T = 20
@@ -225,19 +226,52 @@ def test_damaged_header(tmp_path: Path, whole: bytes, at: int, new: bytes, expec
     assert expected in refused(tmp_path, changed(whole, at, new))
 
 
-def test_a_number_of_frames_that_is_a_float_is_read(tmp_path: Path, whole: bytes) -> None:
-    """The user guide's way beyond 65535 frames; ezc3d asks for an integer."""
+def floated(whole: bytes, frames: float) -> bytes:
+    """With POINT:FRAMES as a float."""
     kind, values = spot(whole, "POINT", "FRAMES", "type"), spot(whole, "POINT", "FRAMES", "values")
     (offset,) = struct.unpack("<H", whole[kind - 2 : kind])
-    record = struct.pack("<H", offset + 2) + b"\x04" + whole[kind + 1 : values] + struct.pack("<f", float(T))
+    record = struct.pack("<H", offset + 2) + b"\x04" + whole[kind + 1 : values] + struct.pack("<f", frames)
     data_start = 512 * (struct.unpack("<H", whole[16:18])[0] - 1)
-    floated = whole[: kind - 2] + record + whole[values + 2 : data_start - 2] + whole[data_start:]
-    assert len(floated) == len(whole)
+    found = whole[: kind - 2] + record + whole[values + 2 : data_start - 2] + whole[data_start:]
+    assert len(found) == len(whole)
+    return found
+
+
+def test_a_number_of_frames_that_is_a_float_is_read(tmp_path: Path, whole: bytes) -> None:
+    """The user guide's way beyond 65535 frames; ezc3d asks for an integer."""
     path = tmp_path / "a.c3d"
-    path.write_bytes(floated)
+    path.write_bytes(floated(whole, float(T)))
     recording = read_c3d(path)
     assert recording.n_frames == T
     np.testing.assert_allclose(recording.marker("LASI"), 0.5)
+
+
+@pytest.mark.parametrize("frames", [np.inf, np.nan, -np.inf])
+def test_a_number_of_frames_that_is_none_is_refused(tmp_path: Path, whole: bytes, frames: float) -> None:
+    assert "POINT:FRAMES holds no number, expected one" in refused(tmp_path, floated(whole, frames))
+
+
+def test_a_number_of_frames_beyond_the_file_gives_way_to_its_size(tmp_path: Path, whole: bytes) -> None:
+    path = tmp_path / "a.c3d"
+    path.write_bytes(floated(whole, 1e30))
+    recording = read_c3d(path)
+    assert recording.n_frames == T
+    np.testing.assert_allclose(recording.marker("LASI"), 0.5)
+    assert any(
+        "POINT:FRAMES says 65535, the header and the file's size 20" in note for note in map(str, recording.notes)
+    )
+
+
+@pytest.mark.parametrize(("group", "size"), [("POINT", 2), ("TRIAL", 4)])
+def test_only_the_number_of_frames_of_the_points_is_rewritten(tmp_path: Path, group: str, size: int) -> None:
+    def record(name: bytes, number: int, content: bytes) -> bytes:
+        return struct.pack("bb", len(name), number) + name + struct.pack("<H", 2 + len(content)) + content
+
+    section = bytes([0, 0, 1, 84]) + record(group.encode(), -1, b"\0")
+    section += record(b"FRAMES", 1, b"\x04\x00" + struct.pack("<f", 7.0) + b"\0")
+    groups, anew = read_records(section + bytes(8), 512, tmp_path, dec=False)
+    found = groups[group]["FRAMES"]
+    assert found.kind == size and found.first() == 7.0 and bool(anew) == (group == "POINT")
 
 
 def test_harmless_contradictions_are_noted(tmp_path: Path, whole: bytes) -> None:

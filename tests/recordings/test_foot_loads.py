@@ -240,6 +240,29 @@ def test_a_long_plate_is_shared_in_double_support_wherever_a_recording_begins_an
     assert measured.all(axis=1)[(made.push[first:end] > 10.0).sum(axis=1) < 2].mean() > 0.5
 
 
+@pytest.mark.parametrize(("early", "shift_m"), [(0, 0.0), (6, -0.6), (6, 0.6)])
+def test_the_order_of_the_plates_changes_nothing(early: int, shift_m: float) -> None:
+    """Each foot on two plates at once, loaded before it is seen to stand, on one of them beside it while lightly."""
+    feet = {
+        side: [replace(s, plates=(f"{side} {k} back", f"{side} {k} front")) for k, s in enumerate(own)]
+        for side, own in walk(4, 0.6).items()
+    }
+    made = steps(lasting(4), feet, [MadePlate(n, edges=False) for own in feet.values() for s in own for n in s.plates])
+    plates = []
+    for plate in made.recording.plates:
+        force, moment, cop = (np.roll(v, -early, axis=0) for v in (plate.force, plate.moment, plate.cop))
+        off = np.outer((force[:, 1] < 200.0) & ("back" in plate.name), [shift_m, 0.0, 0.0])
+        plates.append(replace(plate, force=force, moment=moment + np.cross(off, force), cop=cop + off))
+    one, other = (
+        foot_loads(made.recording.with_plates(tuple(given)), LABORATORY, FOOT_MARKERS)
+        for given in (plates, plates[::-1])
+    )
+    np.testing.assert_array_equal(one.on, other.on[:, :, ::-1])
+    np.testing.assert_array_equal(one.aloft, other.aloft)
+    np.testing.assert_array_equal(one.reason, other.reason)
+    np.testing.assert_allclose(one.wrench, other.wrench, atol=1e-9)
+
+
 def test_a_foot_whose_sole_its_markers_do_not_show_keeps_its_plate() -> None:
     """Its heel lies 0.16 m behind the only marker."""
     made = steps(lasting(4), walk(4, 0.6), [MadePlate(f"p{k}", edges=False) for k in range(4)])

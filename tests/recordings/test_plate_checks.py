@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.checks import PlateCheck, check_plates
+from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.axes import turned_feet
@@ -121,6 +122,17 @@ def test_forces_in_other_axes_than_the_markers_are_named(rows: list[int], axis: 
     found = check(made.with_plates(plates))
     assert found.refusal is not None
     assert re.search(rf"the forces lie along {axis} \(6[0-9]+ N .*, vertical is \+Y: give the forces in", found.refusal)
+
+
+def test_a_declared_contacts_plate_may_be_pushed_across_the_vertical() -> None:
+    """A lone wall plate at a rail; of a foot's plate it is other axes."""
+    made = standing(70.0)
+    wall = replace(made.plates[0], force=np.tile([400.0, 0.0, 0.0], (made.n_frames, 1)), corners=None)
+    recording = made.with_plates((wall,))
+    ground = find_ground_frame(recording, vertical="+Y")
+    loads = foot_loads(recording, ground, FEET, assigned={wall.name: "rail"}, others=["rail"])
+    assert "the forces lie along +X (400 N" in (check(recording).refusal or "")
+    assert check_plates(recording, ground, None, FEET, loads).refusal is None
 
 
 def test_pressure_somewhat_off_the_foot_is_a_warning() -> None:

@@ -68,3 +68,10 @@ def held(values: np.ndarray) -> np.ndarray:
 )
 def test_a_peak_is_none(channels: np.ndarray) -> None:
     assert not at_end_of_range(channels, channels[2]).any()
+
+
+def test_a_signal_that_is_slow_and_without_noise_is_no_rest() -> None:
+    """No step of it is larger than the difference within which its values are one."""
+    push = 800.0 * np.sin(np.linspace(0.0, np.pi, 1_000_000))
+    assert np.abs(np.diff(push)).max() < 1e-5 * np.ptp(push)
+    assert not at_end_of_range(push[None], push).any()

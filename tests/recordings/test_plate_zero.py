@@ -20,7 +20,30 @@ STEP *= np.repeat((np.arange(FRAMES) > 50) & (np.arange(FRAMES) < 130), PER_FRAM
 PUSH = np.stack([60.0 * STEP, 0.0 * STEP, -800.0 * STEP, 40.0 * STEP, 20.0 * STEP, 0.0 * STEP])
 CORNERS = np.array([[200.0, 300, 0], [-200, 300, 0], [-200, -300, 0], [200, -300, 0]])
 UNITS = ["N"] * 3 + ["Nm"] * 3
-OFFSET = np.array([[15.0], [-20.0], [60.0], [3.0], [2.0], [-0.5]])
+OFFSET = np.array([[15.0], [-20.0], [40.0], [3.0], [2.0], [-0.5]])
+
+
+def zeroed(
+    path: Path, channels: np.ndarray, zero: tuple[int, ...], markers: dict[str, np.ndarray], kind: int = 2
+) -> tuple[np.ndarray, list[str]]:
+    """Forces (T, 3) N that are read, and what is said of the zero; markers in m."""
+    plate = {
+        "USED": 1,
+        "TYPE": [kind],
+        "CHANNEL": np.arange(1, 7).reshape(6, 1),
+        "CORNERS": CORNERS.T[:, :, None],
+        "ORIGIN": np.array([[0.0], [0.0], [-40.0]]),
+    }
+    made_c3d(
+        path,
+        {"LASI": np.full((FRAMES, 3), 500.0)} | {name: 1000.0 * place for name, place in markers.items()},
+        {"FORCE_PLATFORM": plate | ({"ZERO": list(zero)} if zero else {}), "ANALOG": {"UNITS": UNITS}},
+        analog=channels,
+        per_frame=PER_FRAME,
+    )
+    recording = read_c3d(path)
+    said = [note for note in map(str, recording.notes) if "FORCE_PLATFORM:ZERO" in note]
+    return recording.plates[0].force, said
 
 
 @pytest.mark.parametrize(
@@ -39,29 +62,50 @@ def test_the_zero_that_the_file_gives_is_taken_off(
     tmp_path: Path, zero: tuple[int, ...], heel_m: float, taken_off: bool
 ) -> None:
     def read(name: str, channels: np.ndarray, zero: tuple[int, ...]) -> np.ndarray:
-        plate = {
-            "USED": 1,
-            "TYPE": [2],
-            "CHANNEL": np.arange(1, 7).reshape(6, 1),
-            "CORNERS": CORNERS.T[:, :, None],
-            "ORIGIN": np.array([[0.0], [0.0], [-40.0]]),
-        }
-        path = made_c3d(
-            tmp_path / name,
-            {"LASI": np.full((FRAMES, 3), 500.0), "LHEE": np.full((FRAMES, 3), [0.0, 0.0, 1000.0 * heel_m])},
-            {"FORCE_PLATFORM": plate | ({"ZERO": list(zero)} if zero else {}), "ANALOG": {"UNITS": UNITS}},
-            analog=channels,
-            per_frame=PER_FRAME,
-        )
-        recording = read_c3d(path)
-        said = [note for note in map(str, recording.notes) if "FORCE_PLATFORM:ZERO" in note]
+        force, said = zeroed(tmp_path / name, channels, zero, {"LHEE": np.full((FRAMES, 3), [0.0, 0.0, heel_m])})
         assert len(said) == (zero in ((1, 20), (20, 20)))
-        force: np.ndarray = recording.plates[0].force
         return force
 
     clean, found = read("a.c3d", PUSH, ()), read("b.c3d", PUSH + OFFSET, zero)
     apart = np.abs(found - clean)[60:120].max()
-    assert apart < 1e-3 if taken_off else apart > 50.0
+    assert apart < 1e-3 if taken_off else apart > 30.0
+
+
+SEATED = np.repeat([[0.0], [0.0], [-500.0], [0.0], [0.0], [0.0]], FRAMES * PER_FRAME, axis=1)
+PELVIS = np.full((FRAMES, 3), [0.0, 0.0, 0.55])
+
+
+@pytest.mark.parametrize("part", [1.0, 0.02])  # of the frames of the zero: a mean of 500 N, and of 10 N
+def test_a_persons_weight_is_no_zero(tmp_path: Path, part: float) -> None:
+    """A seat's plate: no marker is low over it, the feet are on another one."""
+    channels = SEATED.copy()
+    channels[:, : round((1.0 - part) * FRAMES * PER_FRAME)] = 0.0
+    feet = np.full((FRAMES, 3), [0.0, 0.9, 0.05])
+    force, said = zeroed(tmp_path / "a.c3d", channels, (1, FRAMES), {"PELVIS": PELVIS, "LHEE": feet})
+    assert np.abs(force[-3:-1]).max() > 450.0
+    assert len(said) == 1 and f"plate 1: it reads {500.0 * part:.0f} N on average, and" in said[0]
+    assert "they are not taken for its zero" in said[0]
+
+
+def test_frames_in_which_nobody_is_seen_are_no_zero(tmp_path: Path) -> None:
+    places = PELVIS.copy()
+    places[:20] = np.nan
+    hidden = {"LASI": places, "PELVIS": places}
+    force, said = zeroed(tmp_path / "a.c3d", PUSH + OFFSET, (1, 20), hidden)
+    clean, _ = zeroed(tmp_path / "clean.c3d", PUSH, (), hidden)
+    np.testing.assert_allclose(np.linalg.norm((force - clean)[90]), np.linalg.norm(OFFSET[:3]), rtol=1e-3)
+    assert len(said) == 1 and "plate 1: no marker is seen in frames 1 to 20" in said[0]
+    _, said = zeroed(tmp_path / "b.c3d", PUSH + OFFSET, (1, 21), hidden)
+    assert len(said) == 1 and "was taken off as its zero" in said[0]
+
+
+def test_that_centres_of_pressure_have_no_zero_is_said(tmp_path: Path) -> None:
+    """Of type 1."""
+    off = np.add(PUSH, [[15.0], [-20.0], [-40.0], [0.0], [0.0], [0.0]])
+    force, said = zeroed(tmp_path / "a.c3d", off, (1, 20), {"PELVIS": PELVIS}, kind=1)
+    clean, _ = zeroed(tmp_path / "b.c3d", off, (), {"PELVIS": PELVIS}, kind=1)
+    np.testing.assert_array_equal(force, clean)
+    assert len(said) == 1 and "plate 1: its mean in frames 1 to 20" in said[0] and "was not taken off" in said[0]
 
 
 def test_a_plate_that_is_loaded_wherever_the_feet_are_is_to_be_zeroed() -> None:

@@ -160,7 +160,9 @@ def _known_ground(
     steps_kg = initial.weighed_kg if initial.feet and not initial.contacts else None
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads, steps_kg)
     if check.refusal:
-        raise RecordingError(f"{recording.plates_file}: {check.refusal}{_how_to_give(initial, loads)}")
+        raise RecordingError(
+            f"{recording.plates_file}: {check.refusal}{_how_to_give(initial, loads, check.under_no_foot)}"
+        )
     if check.unused:
         ground, nothing = _known_ground(recording.with_plates(()), initial, markers, np.full_like(wrench, np.nan))
         loads = ground.loads
@@ -231,10 +233,11 @@ def _loads_of_feet(
 
 
 def _declared_contacts(initial: CalibratedModel, markers: Array) -> tuple[Array, Flags]:
-    """(T, 1 + C, 3) m where the root and the declared contacts are; (T, C) frames in which each of these may bear."""
-    paths = ContactPaths.of(initial).at(markers)
+    """(T, 1 + C, 3) m where the root and the declared contacts are, NaN where none is declared; (T, C) frames in which
+    each of these may bear."""
     if not initial.contacts:
-        return paths, np.zeros((len(markers), 0), dtype=bool)
+        return np.full((len(markers), 1, 3), np.nan), np.zeros((len(markers), 0), dtype=bool)
+    paths = ContactPaths.of(initial).at(markers)
     floor = float(np.nanmin(markers[..., 1]))
     return paths, may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor)
 
@@ -246,12 +249,12 @@ def _taken_in_words(plate: str, contact: str) -> str:
     )
 
 
-def _how_to_give(initial: CalibratedModel, loads: FootLoads | None) -> str:
-    """What to do about a plate that is refused while a declared contact has none."""
+def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str | None) -> str:
+    """What to do about a plate that is refused for where it is pressed while a declared contact has none."""
     names = [name for name in initial.contacts if loads is not None and name not in loads.others]
-    if not names:
+    if not names or plate is None:
         return ""
-    return f'. If that plate bears the {names[0]}, say so in a configuration: plates = {{ "its name" = "{names[0]}" }}'
+    return f'. If {plate} bears the {names[0]}, say so in a configuration: plates = {{ "{plate}" = "{names[0]}" }}'
 
 
 class _Judged(NamedTuple):

@@ -11,7 +11,7 @@ import numpy as np
 
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.contact import NEAR_M, foot_places
+from dynakin.recordings.feet.contact import COP_REFUSED_M, NEAR_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
@@ -22,9 +22,6 @@ from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.recordings.weight import TILT_WARNING_DEG, Findings, check_steps, check_weight, likely_unit, while_loaded
 
-COP_REFUSED_M = 0.30
-"""Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
-be wrong. From `NEAR_M` on it is said."""
 ABOVE_SURFACE_M = (-0.01, SHOE_M)
 """Height of a foot's lowest marker over the centre of pressure under it, in a quarter of its load: 17 to 78 mm in 18
 real recordings, 9 to 40 in simulated ones; a foot that shows nothing but an ankle, 0.1 m."""
@@ -39,7 +36,8 @@ FREE_MOMENT_WARNING_M = 0.05
 """Free moment over vertical force: two feet twisting on the ground rarely exceed 10 N m at 400 N."""
 LYING_N, LYING = (200.0, 4000.0), 0.25
 """Forces of so much on average while they are loaded, as people weigh (more is a unit or scale), and a vertical one of
-less than this part of it: friction allows no more across than 1.5 times the vertical."""
+less than this part of it: a force across the vertical is at most 1.5 times as large as that by friction
+(`limits`), 4 times leaves room for plates that are tilted or drift, and other axes make it tens of times."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +52,7 @@ class PlateCheck:
         messages: sentences with numbers; warnings of what is wrong.
         refusal: why the plates cannot be used, None where they can. The caller decides what follows from it.
         unused: they carry nobody although a foot may be on them: a run does without them.
+        under_no_foot: name of the first plate that is refused for where it is pressed: it may be a contact's.
     """
 
     mass_kg_from_plates: float | None
@@ -61,6 +60,7 @@ class PlateCheck:
     messages: tuple[Message, ...]
     refusal: str | None
     unused: bool = False
+    under_no_foot: str | None = None
 
 
 def check_plates(
@@ -94,7 +94,8 @@ def check_plates(
     frames = standing if standing is not None else slice(None)
     places = _feet(recording, ground, foot_markers or {}, findings)
     feet = {foot: place[:, :, [0, 2]] for foot, place in places.items()}
-    if lying := _lying(recording, ground):
+    given = () if loads is None else loads.given
+    if lying := _lying([plate for p, plate in enumerate(recording.plates) if p not in given], ground):
         return PlateCheck(None, None, tuple(findings.messages), lying)
     if mass_kg is None and (idle := _idle(recording, ground, feet, steps_kg)):
         findings.messages.append(idle)
@@ -105,6 +106,7 @@ def check_plates(
     if steps_kg is not None:
         check_steps(recording, ground, steps_kg, loads, findings)
     under: dict[str, str] = {}
+    under_no_foot: str | None = None
     over_edge = standing is not None and _over_the_edge(recording, ground, loads, frames, findings)
     for p, plate in enumerate(recording.plates):
         if (beyond := beyond_limits(plate, recording, ground)) is not None:
@@ -118,7 +120,10 @@ def check_plates(
             findings.say(f"{plate.name} bears the {loads.given[p]}.")
             continue
         hidden = [name for name, own in (foot_markers or {}).items() if not own]
+        refused = len(findings.refusals)
         foot = _check_pressure(plate, loaded, feet, _owner(loads, loaded, p), ground, hidden, findings)
+        if len(findings.refusals) > refused:
+            under_no_foot = under_no_foot or plate.name
         _check_height(plate, loaded, places, recording.rate, ground, findings)
         _check_free_moment(plate, loaded, ground, findings)
         _check_level(plate, ground, findings)
@@ -130,7 +135,7 @@ def check_plates(
     standing_mass, mean_mass = (mass, None) if standing is not None else (None, mass)
     if over_edge:
         standing_mass = None
-    return PlateCheck(standing_mass, mean_mass, tuple(findings.messages), refusal)
+    return PlateCheck(standing_mass, mean_mass, tuple(findings.messages), refusal, under_no_foot=under_no_foot)
 
 
 def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame) -> slice | None:
@@ -140,9 +145,12 @@ def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame
     return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
 
 
-def _lying(recording: Recording, ground: GroundFrame) -> str | None:
-    """A sentence on forces that are large, and all across the vertical: they have other axes than the markers."""
-    total = np.nan_to_num(np.sum([plate.force for plate in recording.plates], axis=0))
+def _lying(plates: Sequence[Plate], ground: GroundFrame) -> str | None:
+    """A sentence on forces of the feet's plates that are large, and all across the vertical: they have other axes than
+    the markers. A declared contact may be pushed in any direction (a wall)."""
+    if not plates:
+        return None
+    total = np.nan_to_num(np.sum([plate.force for plate in plates], axis=0))
     size = np.linalg.norm(total, axis=1)
     mean = total[size > 0.5 * size.max()].mean(axis=0) if size.max() > LYING_N[0] else np.zeros(3)
     k = int(np.argmax(np.abs(mean)))

@@ -130,12 +130,14 @@ class _Assignment:
         for k, foot in enumerate(feet):
             if foot in contacts:
                 low[:, k] = contacts[foot].low
+        whole = np.zeros_like(self.on)
         for p, plate in enumerate(plates):
             self.presses(p, plate)
             self.on[:, :, p] &= ~self.aloft | (plate.push > JUDGED_N)[:, None]
-            whole = to_the_end(self.on[:, :, p], plate.pressed, steps)
-            self.aloft &= ~(whole & low & self.under[:, :, p])  # a heel is loaded before it is slow
-            self.on[:, :, p] |= whole & ~self.aloft
+            whole[:, :, p] = to_the_end(self.on[:, :, p], plate.pressed, steps)
+        self.aloft &= ~(whole & low[:, :, None] & self.under).any(axis=2)  # a heel is loaded before it is slow
+        for p, plate in enumerate(plates):  # by all plates' loads, in whatever order they are
+            self.on[:, :, p] |= whole[:, :, p] & ~self.aloft
             self.passed_on(p, plate)
         for k, foot in enumerate(feet):
             if foot in contacts:

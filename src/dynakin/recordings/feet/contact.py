@@ -44,6 +44,9 @@ LEVEL_M_S, RESTS_S = 0.15, 0.15
 a jump, it does for 0.05 s."""
 NEAR_M = 0.10
 """How far a centre of pressure may lie from the outline of a foot's markers: a shoe is some cm wider than these."""
+COP_REFUSED_M = 0.30
+"""Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
+be wrong. From `NEAR_M` on it is said."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import filled
 from dynakin.messages import Message
+from dynakin.recordings.feet.contact import COP_REFUSED_M
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N
@@ -17,9 +18,9 @@ from dynakin.recordings.recording import Array
 
 Flags = npt.NDArray[np.bool_]
 
-NOT_ITS_M = 0.45
-"""So far from the middle of a foot's sole a load is not that foot's, wherever the plate's place is not refused: half a
-sole, and 0.3 m (`checks.COP_REFUSED_M`)."""
+_HALF_SOLE_M = 0.15  # of a long shoe, from its middle to where its markers end at most
+NOT_ITS_M = _HALF_SOLE_M + COP_REFUSED_M
+"""So far from the middle of a foot's sole a load is not that foot's, wherever the plate's place is not refused."""
 SWING, MEASURED, SHARED, OFF_PLATE, UNKNOWN = range(5)
 REASONS = ("swing", "measured", "shared plate", "off the plates", "plate not measured")
 """Words for the numbers in `FootLoads.reason`."""

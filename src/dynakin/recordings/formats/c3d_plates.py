@@ -159,15 +159,17 @@ def _raw(
         notes.append(
             warning("plates", f"{name}: unknown unit {word!r} of its {_WORDS[signal]} in ANALOG:UNITS, {taken} taken.")
         )
-    zero = None if kind == 1 else zero_frames(parameters, len(markers))  # a mean of centres of pressure is no zero
-    signals, said = zeroed(name, analog[channels], zero, markers, corners, normal)
+    zero = zero_frames(parameters, len(markers))
+    origin = _origin(parameters, k, kind) * unit_m
+    as_it_is, _ = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=factors)
+    points = "point" in TYPES[kind].outputs
+    signals, said = zeroed(name, analog[channels], as_it_is, zero, markers, corners, normal, points=points)
     notes += said
     half_m = 0.5 * float(np.linalg.norm(corners[0] - corners[2]))
     if TYPES[kind].outputs.count("moment") == 3:
         raw = signals if calibration is None else calibration @ signals
         factors, said = _fitting_moments(name, raw, factors, known, half_m)
         notes += said
-    origin = _origin(parameters, k, kind) * unit_m
     force, moment = plate_wrench(kind, signals, origin=origin, calibration=calibration, units=factors)
     if (ended := at_end_of_range(analog[channels], force[:, 2])).any():
         seconds = np.count_nonzero(ended) * step_s

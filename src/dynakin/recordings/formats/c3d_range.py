@@ -13,7 +13,8 @@ Flags = npt.NDArray[np.bool_]
 
 FLAT = 5
 """So many samples exactly at a channel's extreme, and so many times as many as it holds any other value for while it
-changes (a signal that was held when it was brought to a higher rate)."""
+changes (a signal that was held when it was brought to a higher rate). Its counterpart at the rate of the markers, for
+plates of any file, is `ground_plate.FLAT_FRAMES` (`GroundPlate`)."""
 STEPS = 20
 """A peak that is only written in steps is as flat: but half its width beyond its edges it has fallen by 3 to 4 steps, a
 signal that was cut off by three times the depth of the cut."""
@@ -48,6 +49,8 @@ def _at_end(values: Array, loaded: Flags, same: float) -> Flags:
         return found
     change = np.abs(np.diff(values))
     moves = change > same * size
+    if not moves.any():  # so slow, and without noise, that nothing tells a rest
+        return found
     step = float(change[moves].min())
     for first, end in flat:
         half = (end - first) // 2

@@ -108,7 +108,8 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[
         else:
             record, end = _parameter(inside, here + 2, start + len(anew) - at, path, what, dec)
             values = section[here + 2 : end]
-            if name == "FRAMES" and record.kind == 4 and record.first() >= 0.0:
+            counts = name == "FRAMES" and names.get(group, "POINT") == "POINT"  # or of a group that is named later
+            if counts and record.kind == 4 and 0.0 <= record.first() < math.inf:  # others are refused with the counts
                 record, values = _whole(record)
             found.setdefault(group, {})[name] = record
         length = _take(inside, end, 1, start, path, what)[0]
@@ -139,7 +140,7 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[
 def _whole(frames: Record) -> tuple[Record, bytes]:
     """A number of frames that is written as a float (the user guide's way beyond 65535) as the integer that ezc3d asks
     for, which takes 65535 as up to the file's end; and as it stands in the file, with its type."""
-    raw = struct.pack("<H", min(round(frames.first()), 65535))
+    raw = struct.pack("<H", round(min(frames.first(), 65535.0)))
     return replace(frames, kind=2, raw=raw), b"\x02\x00" + raw
 
 

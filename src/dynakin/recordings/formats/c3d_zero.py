@@ -7,6 +7,7 @@ import numpy as np
 from dynakin.messages import Message, note
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array
 
 OVER_M = (-0.1, 0.3)
@@ -22,23 +23,49 @@ def zero_frames(parameters: Parameters, frames: int) -> slice | None:
 
 
 def zeroed(
-    name: str, channels: Array, frames: slice | None, markers: Array, corners: Array, normal: Array
+    name: str,
+    channels: Array,
+    force: Array,
+    frames: slice | None,
+    markers: Array,
+    corners: Array,
+    normal: Array,
+    *,
+    points: bool,
 ) -> tuple[Array, list[Message]]:
-    """Channels (C, N) of a plate with their mean over these frames taken off, unless a marker is over the plate then;
+    """Channels (C, N) of a plate with their mean over these frames taken off, unless something may press on it then;
     and what there is to say of it.
 
     Args:
-        markers: (T, M, 3) m. corners: (4, 3) m, of the plate. normal: (3,) of its surface, upwards.
+        force: (N, 3) N, of the plate as it is. markers: (T, M, 3) m. corners: (4, 3) m, of the plate. normal: (3,) of
+            its surface, upwards. points: the channels hold centres of pressure (type 1), which have no zero, and were
+            computed with that of the forces, or without it.
     """
     if frames is None:
         return channels, []
     which = f"frames {frames.start + 1} to {frames.stop} (FORCE_PLATFORM:ZERO in the file)"
-    if _somebody_over(markers[frames], corners, normal):
-        text = f"{name}: a foot is over it in {which}: they are not taken for its zero."
+    if points:
+        text = f"{name}: its mean in {which} was not taken off: its channels hold centres of pressure (type 1)."
         return channels, [note("plates", text)]
     per_frame = channels.shape[1] // len(markers)
-    mean = channels[:, frames.start * per_frame : frames.stop * per_frame].mean(axis=1, keepdims=True)
+    samples = slice(frames.start * per_frame, frames.stop * per_frame)
+    if why := _in_use(force[samples], markers[frames], corners, normal):
+        return channels, [note("plates", f"{name}: {why} in {which}: they are not taken for its zero.")]
+    mean = channels[:, samples].mean(axis=1, keepdims=True)
     return channels - mean, [note("plates", f"{name}: its mean in {which} was taken off as its zero.")]
+
+
+def _in_use(force: Array, markers: Array, corners: Array, normal: Array) -> str | None:
+    """Why forces (N, 3) N may not be those of an empty plate while the markers (T, M, 3) are so: None where they are. A
+    seat bears somebody of whom no marker is low over it, so the load is looked at, too."""
+    if not np.isfinite(markers).all(axis=2).any():
+        return "no marker is seen"
+    if _somebody_over(markers, corners, normal):
+        return "a foot is over it"
+    load, spread = float(np.linalg.norm(force.mean(axis=0))), float(np.ptp(force, axis=0).max())
+    if load <= JUDGED_N and spread <= JUDGED_N:
+        return None
+    return f"it reads {load:.0f} N on average, and {spread:.0f} N between its least and most,"
 
 
 def _somebody_over(markers: Array, corners: Array, normal: Array) -> bool:
