@@ -28,7 +28,7 @@ from dynakin.recordings.low_passed import LowPass
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import nearly_singular
-from dynakin.results.measures.sources import MEASURED, plates_refused
+from dynakin.results.measures.sources import MEASURED, plates_refused, refused_for_long
 from dynakin.results.records import NO_ESTIMATE_CODES, Timing
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
@@ -157,10 +157,9 @@ def _refused_in_words(data: xr.Dataset) -> Message | None:
     if not refused.any():
         return None
     count, of = np.count_nonzero(refused), np.count_nonzero(estimated)
-    text = (
-        f"The plates contradict the motion in {count} of {of} frames and are not used there: moments are derived from "
-        "the motion."
-    )
+    long = refused_for_long(data) & estimated if "foot_contact" in data else refused
+    how = "are derived from the motion" if long.any() else "rest on the frames before and after"
+    text = f"The plates contradict the motion in {count} of {of} frames and are not used there: moments {how}."
     many = count > MANY_REFUSED * of
     return warning("plates", f"{text} Check the plates' places and units.") if many else note("plates", text)
 
