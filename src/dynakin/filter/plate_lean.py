@@ -67,17 +67,17 @@ class _Lean:
     """What a plate's frames show: lean and force over load, (K, 2) each, along the way over it and across.
 
     Attributes:
-        turns: (7, 2, 2) `TURNS` of its axes, in these axes.
+        lean: along the way and across. axes: the plate's.
     """
 
     def __init__(self, lean: Array, push: Array, axes: PlateAxes) -> None:
         x, z = np.linalg.eigh(np.cov(lean.T))[1][:, 1]
         way = np.array([[x, z], [-z, x]])
-        self.lean, self._push, self._axes, self._way = lean @ way.T, push, axes, way
+        self.lean, self.axes, self._push, self._way = lean @ way.T, axes, push, way
 
     def push(self, turn: Array) -> Array:
         """Force over load (K, 2) with the plate's axes turned."""
-        return np.asarray(self._axes.turned(self._push, turn) @ self._way.T)
+        return np.asarray(self.axes.turned(self._push, turn) @ self._way.T)
 
 
 def turned_by_lean(plates: Sequence[Plate], initial: CalibratedModel, root: Array, rate_hz: float) -> str | None:
@@ -89,23 +89,22 @@ def turned_by_lean(plates: Sequence[Plate], initial: CalibratedModel, root: Arra
     """
     ground, weight = initial.ground, initial.weighed_kg * GRAVITY_M_S2
     leans = dict[str, _Lean]()
-    axes = [PlateAxes(plate, ground) for plate in plates]
-    for plate, own in zip(plates, axes, strict=True):
+    for plate in plates:
         force, cop = ground.vectors_to_ground(plate.force), ground.points_to_ground(plate.cop)
         arm = root - cop
         on = (np.nan_to_num(force[:, 1]) > LOADED * weight) & np.isfinite(arm).all(axis=1) & (arm[:, 1] > 0.0)
         on = _passing(on, arm, rate_hz)
         if not on.any():
             continue
-        leans[plate.name] = _Lean(arm[on][:, [0, 2]] / arm[on][:, [1]], force[on][:, [0, 2]] / force[on][:, [1]], own)
+        lean, push = (values[on][:, [0, 2]] / values[on][:, [1]] for values in (arm, force))
+        leans[plate.name] = _Lean(lean, push, PlateAxes(plate, ground))
     every = list(leans)
     for names in (every, *([name] for name in every if len(every) > 1)):
         chosen = [leans[name] for name in names]
         if names and (how := _better(chosen)) is not None:
-            first = next(own for plate, own in zip(plates, axes, strict=True) if plate.name == names[0])
             return (
                 f"the horizontal force of {listed(names)} does not fit the motion: it pushes the body against the way "
-                f"it leans over the foot, and with it if {first.in_words(how)}"
+                f"it leans over the foot, and with it if {chosen[0].axes.in_words(how)}"
             )
     return None
 
@@ -123,13 +122,10 @@ def _better(leans: Sequence[_Lean]) -> str | None:
 
 def _follows(leans: Sequence[_Lean], turn: Array) -> tuple[float, float, float, float]:
     """Correlation and slope of force over load with the lean along the way, and both across it."""
-    way, own = (np.concatenate([_less_mean(v[:, 0]) for v in of]) for of in _pairs(leans, turn))
-    side, other = (np.concatenate([v[:, 1] for v in of]) for of in _pairs(leans, turn))
+    pairs = [(each.lean, each.push(turn)) for each in leans]
+    way, own = (np.concatenate([_less_mean(v[:, 0]) for v in of]) for of in zip(*pairs, strict=True))
+    side, other = (np.concatenate([v[:, 1] for v in of]) for of in zip(*pairs, strict=True))
     return *_fit(way, own), *_fit(side, other)
-
-
-def _pairs(leans: Sequence[_Lean], turn: Array) -> tuple[list[Array], list[Array]]:
-    return [each.lean for each in leans], [each.push(turn) for each in leans]
 
 
 def _less_mean(values: Array) -> Array:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from dynakin.filter.closure import smoothed
 from dynakin.filter.mass_centre import mass_centre
+from dynakin.filter.plate_clock import Delay
 from dynakin.filter.plate_lean import root_path, turned_by_lean
 from dynakin.filter.samples import in_step
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -77,14 +78,13 @@ class Needed:
     Attributes:
         time: (T,) s. rate: Hz. weight: N, with what is carried.
         force: (T, 3) N, ground axes. known: (T,) frames in which it is. whole: all of the body is marked.
-        root: (T, 3) m, `root_path`. coarse_s: standard deviation of a delay that it shows.
+        root: (T, 3) m, `root_path`.
     """
 
     def __init__(self, initial: CalibratedModel, time: Array, markers: Array) -> None:
         found = mass_centre(initial, time, markers)
         self.time, self.rate, self.weight = time, rate_of(time), initial.weighed_kg * GRAVITY_M_S2
         self.whole, self.root = not initial.unseen_kg, root_path(initial, markers)
-        self.coarse_s = COARSE_S if self.whole else COARSE_LEGS_S
         self.known: Flags = np.zeros(len(time), dtype=bool) if found is None else found.known
         self.force = np.zeros((len(time), 3)) if found is None else found.needed_force(initial.weighed_kg)
 
@@ -115,19 +115,19 @@ class Needed:
         return float(np.sqrt(np.sum(self.smoothed(self.force - force, force).var(axis=0))))
 
 
-def plates_delay(needed: Needed, force: Array) -> float | None:
-    """By how much plates lag, s, whose sum (T, 3) N is known where it is no NaN; None where they are in step, or
-    nothing can be said."""
+def plates_delay(needed: Needed, force: Array) -> Delay | None:
+    """By how much plates lag whose sum (T, 3) N is known where it is no NaN; None where they are in step, or nothing
+    can be said."""
     delays, misfits, judged = _misfits(needed, force)
     k, now = int(np.argmin(misfits)), misfits[len(delays) // 2]
     if not 0 < k < len(delays) - 1 or not np.isfinite(misfits[k - 1 : k + 2]).all():
         return None
     before, least, after = misfits[k - 1 : k + 2]
     delay = float(delays[k] + 0.5 * STEP_S * (before - after) / max(before - 2.0 * least + after, 1e-12))
-    shortest = LEAST_S if needed.whole else LEAST_LEGS_S
+    shortest, sd_s = (LEAST_S, COARSE_S) if needed.whole else (LEAST_LEGS_S, COARSE_LEGS_S)
     if abs(delay) < shortest or least > LESS * now or least > NEAR * needed.weight:
         return None
-    return delay if judged[k] > KEPT * needed.judged_s(force) else None
+    return Delay(delay, sd_s) if judged[k] > KEPT * needed.judged_s(force) else None
 
 
 def hides_clock(needed: Needed, force: Array) -> bool:

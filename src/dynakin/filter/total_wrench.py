@@ -179,8 +179,7 @@ def _known_ground(
         total = np.where(loads.total_known[:, None], wrench[:, :3], np.nan)
         delay = None if in_step else plates_delay(needed, total)
         if delay is not None:
-            coarse = Delay(delay, needed.coarse_s)
-            return _brought_into_step(recording, initial, markers, coarse, assigned, tolerance)
+            return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
         if not in_step and hides_clock(needed, total):
             by_motion.append(note("sum of the plates", CLOCK_HIDDEN))
         found = None if initial.contacts else fitting_rate(needed, total)

@@ -154,13 +154,12 @@ def _lying(plates: Sequence[Plate], ground: GroundFrame) -> str | None:
     size = np.linalg.norm(total, axis=1)
     mean = total[size > 0.5 * size.max()].mean(axis=0) if size.max() > LYING_N[0] else np.zeros(3)
     k = int(np.argmax(np.abs(mean)))
-    if not LYING_N[0] < np.abs(mean[k]) < LYING_N[1] or np.abs(ground.vectors_to_ground(mean)[1]) > LYING * np.abs(
-        mean[k]
-    ):
+    along, upwards = abs(mean[k]), abs(ground.vectors_to_ground(mean)[1])
+    if not LYING_N[0] < along < LYING_N[1] or upwards > LYING * along:
         return None
     axis = f"{'+' if mean[k] > 0.0 else '-'}{'XYZ'[k]}"
     return (
-        f"the forces lie along {axis} ({abs(mean[k]):.0f} N on average while loaded), vertical is {ground.vertical}: "
+        f"the forces lie along {axis} ({along:.0f} N on average while loaded), vertical is {ground.vertical}: "
         "give the forces in the axes of the markers"
     )
 

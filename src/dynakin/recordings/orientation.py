@@ -108,7 +108,6 @@ def _walking(recording: Recording, up: Array) -> tuple[Array | None, float]:
 
 
 AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
-_BODY, _PLATES = "the body above the feet", "the plates' force"
 _MIN_SHARE = 0.8  # how much of a direction an axis must hold to be taken for it (37 deg)
 
 
@@ -137,7 +136,13 @@ def find_vertical(recording: Recording, pairs: FacingPairs) -> tuple[str, list[s
     Raises:
         RecordingError: no witness.
     """
-    found = _upward(recording, pairs)
+    witnesses: list[tuple[str, Callable[[], str | None]]] = [
+        ("the body above the feet", lambda: _from_body(recording, pairs)),
+        ("the plates' force", lambda: _from_plates(recording)),
+        ("the longer side of the markers' box", lambda: _from_spread(recording)),
+        ("the file's Y_SCREEN", lambda: _from_screen(recording)),
+    ]
+    found = [(why, axis) for why, witness in witnesses if (axis := witness())]
     if not found:
         where = recording.path or recording.name
         raise RecordingError(f"{where}: vertical axis not found, expected it to be given")
@@ -150,23 +155,11 @@ def find_vertical(recording: Recording, pairs: FacingPairs) -> tuple[str, list[s
     return vertical, how
 
 
-def _upward(recording: Recording, pairs: FacingPairs) -> list[tuple[str, str]]:
-    """Who says which axis points up."""
-    witnesses: list[tuple[str, Callable[[], str | None]]] = [
-        (_BODY, lambda: _from_body(recording, pairs)),
-        (_PLATES, lambda: _from_plates(recording)),
-        ("the longer side of the markers' box", lambda: _from_spread(recording)),
-        ("the file's Y_SCREEN", lambda: _from_screen(recording)),
-    ]
-    return [(why, axis) for why, witness in witnesses if (axis := witness())]
-
-
 def against_vertical(recording: Recording, axis: str, pairs: FacingPairs) -> tuple[str, bool]:
     """The axis that points up where the body says another than a given one, "" where it does not; and whether the
     plates say so too, as they do not of one who lies."""
-    said = dict(_upward(recording, pairs))
-    body = said.get(_BODY, axis)
-    return ("", False) if body == axis else (body, said.get(_PLATES) == body)
+    body = _from_body(recording, pairs) or axis
+    return ("", False) if body == axis else (body, _from_plates(recording) == body)
 
 
 def _name(direction: Array) -> str | None:

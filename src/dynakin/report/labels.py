@@ -56,5 +56,5 @@ def parameter_label(parameter: Parameter, marker_names: dict[str, str]) -> str:
 
 def signed_percent(value: float) -> str:
     """`+0.7 %`, `−0.2 %`, `0.0 %`."""
-    text = f"{value:+z.1f}"
+    text = f"{value:+.1f}"
     return "0.0 %" if float(text) == 0.0 else f"{text} %".replace("-", "−")

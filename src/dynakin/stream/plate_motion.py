@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.plate_motion import COARSE_S, Needed, plates_delay, turned_axes
+from dynakin.filter.plate_clock import Delay
+from dynakin.filter.plate_motion import Needed, plates_delay, turned_axes
 from dynakin.filter.total_wrench import doubtful_mass
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -37,8 +38,8 @@ class LivePlateMotion:
     """Keeps what was measured of late, and asks it.
 
     Attributes:
-        delay_s: by how much the plates lag behind the markers as they come now, s; None where that is not known or they
-            are in step. coarse_s: its standard deviation.
+        delay: by how much the plates lag behind the markers as they come now; None where that is not known or they are
+            in step.
         turned, mass: sentences where their axes are others, where they carry another mass.
     """
 
@@ -47,8 +48,7 @@ class LivePlateMotion:
         self._kept: deque[tuple[float, Array, Array, bool, bool]] = deque()
         self._asked_s: float | None = None
         self._every_s = FIRST_S
-        self.delay_s: float | None = None
-        self.coarse_s = COARSE_S
+        self.delay: Delay | None = None
         self.turned: str | None = None
         self.mass: Message | None = None
 
@@ -72,13 +72,13 @@ class LivePlateMotion:
             return False
         self._asked_s = time_s
         self._ask()
-        if self.delay_s is not None:
+        if self.delay is not None:
             self._kept.clear()  # of plates as they came until now
             self._every_s = FIRST_S
-        return any(found is not None for found in (self.delay_s, self.turned, self.mass))
+        return any(found is not None for found in (self.delay, self.turned, self.mass))
 
     def _ask(self) -> None:
-        self.delay_s = self.turned = self.mass = None
+        self.delay = self.turned = self.mass = None
         time = np.array([at for at, *_ in self._kept])
         known, whole = (np.array([one[k] for one in self._kept], dtype=bool) for k in (3, 4))
         needed = Needed(self._initial, time, np.stack([one[1] for one in self._kept]))
@@ -93,7 +93,7 @@ class LivePlateMotion:
         up = axis_vector(self._initial.ground.vertical)
         plates = [floor_plate(name, wrenches[:, p], up) for p, name in enumerate(self._plates)]
         self.turned = turned_axes(needed, plates, self._initial, known, _REMEDY)
-        self.delay_s, self.coarse_s = None if self.turned else plates_delay(needed, total), needed.coarse_s
+        self.delay = None if self.turned else plates_delay(needed, total)
         ratio = float(total[judged, 1].mean() / needed.force[judged, 1].mean())
         foreign = float(np.mean(~whole[known]))
         if not foreign:

@@ -401,10 +401,9 @@ class Live:
             self.say(warning("plates", f"{asked.turned}. The plates are not used any more."))
             self._use_plates = self._monitor.used = False
             self._plate_motion = None
-        elif asked.delay_s is not None:
-            self.fusion.plates_behind_s += asked.delay_s
-            found = out_of_step_in_words(asked.delay_s, asked.coarse_s)
-            self.say(f"{found}; from {time_s:.2f} s on they are brought into step.")
+        elif asked.delay is not None:
+            self.fusion.plates_behind_s += asked.delay.delay_s
+            self.say(f"{out_of_step_in_words(*asked.delay)}; from {time_s:.2f} s on they are brought into step.")
         if asked.mass is not None and not self._mass_doubted:
             self._mass_doubted = True
             self.say(asked.mass)

@@ -73,6 +73,11 @@ class Fit:
         """What a model needs at least and the recording lacks."""
         return lacking(self.marker_set, self.names)
 
+    @property
+    def usable(self) -> bool:
+        """Whether a model can be measured by these names as the set reads them."""
+        return not self.lacking and not self.worn
+
 
 def lacking(marker_set: MarkerSetFile, names: Mapping[MarkerKey, str]) -> list[str]:
     """What a model needs at least and is not among these markers: the pelvis, two segments of a leg; in words."""
@@ -129,7 +134,7 @@ def choose_marker_set(recorded: Iterable[str], where: str = "the recording") -> 
 
 
 def _usable(ranked: Sequence[Fit], where: str) -> list[Fit]:
-    found = [fit for fit in ranked if not fit.lacking and not fit.worn]
+    found = [fit for fit in ranked if fit.usable]
     if not found:
         best = ranked[0]
         if best.worn and not best.lacking:
@@ -155,7 +160,7 @@ def refuse_unfit(asked: MarkerSetFile, recording: Recording) -> None:
     if asked.name not in available_marker_sets() or asked != load_marker_set(asked.name):
         return  # one of the user's own knows what it wants
     ranked = fits(recording.seen_names)
-    best = next((fit for fit in ranked if not fit.lacking and not fit.worn), None)
+    best = next((fit for fit in ranked if fit.usable), None)
     names, _ = found_markers(asked, Spellings.of(recording.seen_names))
     if best is not None and _on_legs(asked, names) < _FAR_FEWER * _on_legs(best.marker_set, best.names):
         raise ModelError(

@@ -159,12 +159,12 @@ def _raw(
         notes.append(
             warning("plates", f"{name}: unknown unit {word!r} of its {_WORDS[signal]} in ANALOG:UNITS, {taken} taken.")
         )
-    zero = zero_frames(parameters, len(markers))
-    origin = _origin(parameters, k, kind) * unit_m
-    as_it_is, _ = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=factors)
-    points = "point" in TYPES[kind].outputs
-    signals, said = zeroed(name, analog[channels], as_it_is, zero, markers, corners, normal, points=points)
-    notes += said
+    origin, signals = _origin(parameters, k, kind) * unit_m, analog[channels]
+    if (zero := zero_frames(parameters, len(markers))) is not None:
+        as_it_is, _ = plate_wrench(kind, signals, origin=origin, calibration=calibration, units=factors)
+        points = "point" in TYPES[kind].outputs
+        signals, said = zeroed(name, signals, as_it_is, zero, markers, corners, normal, points=points)
+        notes += said
     half_m = 0.5 * float(np.linalg.norm(corners[0] - corners[2]))
     if TYPES[kind].outputs.count("moment") == 3:
         raw = signals if calibration is None else calibration @ signals

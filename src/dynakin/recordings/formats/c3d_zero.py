@@ -26,7 +26,7 @@ def zeroed(
     name: str,
     channels: Array,
     force: Array,
-    frames: slice | None,
+    frames: slice,
     markers: Array,
     corners: Array,
     normal: Array,
@@ -41,8 +41,6 @@ def zeroed(
             its surface, upwards. points: the channels hold centres of pressure (type 1), which have no zero, and were
             computed with that of the forces, or without it.
     """
-    if frames is None:
-        return channels, []
     which = f"frames {frames.start + 1} to {frames.stop} (FORCE_PLATFORM:ZERO in the file)"
     if points:
         text = f"{name}: its mean in {which} was not taken off: its channels hold centres of pressure (type 1)."

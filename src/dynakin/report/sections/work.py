@@ -144,7 +144,7 @@ def _too_small(estimate: Estimate, metrics: dict[str, Any], joints: list[Joint])
 def _percent(value: float | None, small: bool = False) -> str:
     if value is None:
         return "–"
-    text = f"{value:+z.0f}".replace("-", "−")
+    text = f"{value:+.0f}".replace("-", "−")
     text = "0" if text in ("+0", "−0") else text
     return f"({text})" if small else text
 
