@@ -21,6 +21,7 @@ Recovery::Recovery(Correction& correction)
       measurement_(correction.measurement),
       gate_(correction.gate),
       now_(correction.now),
+      unsure_(correction.model.n_free()),
       forgotten_(correction.model.state_size()) {
   from_.setZero(3, static_cast<Eigen::Index>(model_.markers().size()));
   to_ = from_;
@@ -40,7 +41,11 @@ void Recovery::restart() {
   if (c_.tape) c_.tape->cut = true;
 }
 
-double Recovery::carry_on(double dt) { return carried_ = carried_of(dt); }
+double Recovery::carry_on(double dt) {
+  const double little = 0.25 * settings_.unseen_sd * settings_.unseen_sd;
+  for (int i = 0; i < model_.n_free(); ++i) unsure_[i] = now_.P(i, i) > little;
+  return carried_ = carried_of(dt);
+}
 
 double Recovery::carried_of(double dt) {
   constexpr double rounding = 1e-9;
@@ -60,14 +65,15 @@ double Recovery::carried_of(double dt) {
 }
 
 // A joint whose markers have not been seen for long would be carried on with the speed it last had, to the end of its
-// range; it is held instead.
+// range; it is held instead. One that the last frame knew is not: at the start of a motion a speed that nobody knows
+// takes it beyond the limit in a single step.
 void Recovery::hold() {
   if (memory_.held) return hold_motion();
   if (!settings_.enabled) return;
   const double most = settings_.unseen_sd * settings_.unseen_sd;
   unseen_ = false;
   for (int i = 0; i < model_.n_free(); ++i) {
-    if (!(now_.P(i, i) > most)) continue;
+    if (!unsure_[i] || !(now_.P(i, i) > most)) continue;
     hold_coordinate(i);
     unseen_ = true;
   }

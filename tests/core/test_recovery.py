@@ -446,3 +446,40 @@ def test_wrong_recovery_settings_are_refused(key, value):
     n = model_of(spec).layout.size
     with pytest.raises(ValueError, match="recovery: holds"):
         filter_of(spec, options_of(spec, recovery=_core.RecoverySettings(**{key: value})), np.zeros(n), np.eye(n))
+
+
+def _motion_of_unknown_speed(spec, seen, **recovery):
+    """State and deviations over a trial at 25 Hz whose speeds nobody knows at the start, only these markers seen."""
+    data = recorded(spec.name)
+    n = Layout(spec).blocks["coordinates"][1]
+    P0 = data.P0.copy()
+    P0[: 3 * n] = P0[:, : 3 * n] = 0.0
+    P0[range(3 * n), range(3 * n)] = np.repeat([0.01, 3.0, 40.0], n) ** 2
+    f = filter_of(spec, options_of(spec, recovery=_core.RecoverySettings(**recovery)), data.x0, P0)
+    markers = np.where(np.asarray(seen)[:, None], data.markers, np.nan)
+    f.update(*data.at(0))
+    rows = []
+    for k in range(4, len(markers), 4):
+        f.step(0.04, markers[k], data.wrench[k])
+        rows.append((f.state[: 3 * n], np.sqrt(np.diag(f.covariance)[:n])))
+    return tuple(np.array(each) for each in zip(*rows, strict=True))
+
+
+@each_spec
+def test_a_coordinate_that_is_seen_is_not_held_however_unsure_its_speed_is_at_first(spec):
+    """One step of 0.04 s at 3 rad/s passes the limit; the next frame knows better."""
+    seen = np.ones(len(spec.markers), dtype=bool)
+    free = _motion_of_unknown_speed(spec, seen)
+    limited = _motion_of_unknown_speed(spec, seen, coordinate_sd=0.12, unseen_sd=0.12)
+    np.testing.assert_array_equal(limited[0], free[0])
+
+
+@each_spec
+def test_a_coordinate_that_nobody_sees_is_held_at_its_limit_and_no_further(spec):
+    last = spec.markers[-1].segment
+    seen = np.array([marker.segment != last for marker in spec.markers])
+    free = _motion_of_unknown_speed(spec, seen)[1]
+    limited = _motion_of_unknown_speed(spec, seen, coordinate_sd=0.12, unseen_sd=0.12)[1]
+    hidden = free[-1].argmax()
+    assert free[-1, hidden] > 0.3
+    assert limited[:, hidden].max() < 0.24

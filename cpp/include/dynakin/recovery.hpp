@@ -73,6 +73,7 @@ class Recovery {
   Belief start_, kept_, sought_;  // kept_: as the frame found it; sought_: from where its motion was sought
   Eigen::VectorXd ahead_, posture_, best_;
   MarkerMatrix from_, to_;
+  std::vector<std::uint8_t> unsure_;  // coordinates that the last frame left at half of unseen_sd or more
   std::vector<std::uint8_t> forgotten_;
   const Vector6 no_wrench_ = Vector6::Constant(std::nan(""));
 };

@@ -15,7 +15,7 @@ from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
 from dynakin.filter.impossible import impossible, impossible_in_words
 from dynakin.filter.labels import labels
-from dynakin.filter.noise import prior_factor, unseen_limit
+from dynakin.filter.noise import limit_sd, prior_factor
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import hidden_segments, with_sources
 from dynakin.filter.systematic import Systematic
@@ -129,7 +129,7 @@ def assemble(
         | ground
         | {"reasons": reasons},
     }
-    events = events_of(whole, parameters, initial, unseen_limit(used))  # by what the filter itself believes
+    events = events_of(whole, parameters, initial, limit_sd(used, used.unseen_sd))  # by what the filter itself believes
     if systematic is not None:
         data = systematic.added_over_time(data, late=bool(config.get("lag_s")))
     if low_pass is not None:

@@ -16,7 +16,6 @@ from dynakin.filter.noise import (
     limit_sd,
     marker_variance,
     process_variance,
-    unseen_limit,
     wrench_covariance,
 )
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -58,7 +57,7 @@ def filter_settings(
             f"{', '.join(initial.recorded_markers)}"
         )
     point = noise.reference_point_m
-    unseen = unseen_limit(noise)
+    unseen = limit_sd(noise, noise.unseen_sd)
     sought = {f"{name}_sd": limit_sd(noise, sd) for name, sd in SOUGHT_SD.items()}
     recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen, **sought) if noise.recover else None
     density, decay = continuous_noise(initial, noise, layout)

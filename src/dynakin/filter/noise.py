@@ -102,23 +102,11 @@ SOUGHT_SD = {"coordinate": 0.5, "speed": 2.0, "acceleration": 20.0}
 """The same of a motion that was lost and is sought anew, by the declared variances. Half as much: markers that were
 refused until now may be wrong still, and the less a speed is known the more of them the next frames agree with."""
 
-LEAST_UNSEEN_SD = 0.25
-"""rad or m: 3 rad/s and m/s for a frame at 25 Hz, twice."""
-
 
 def limit_sd(noise: Noise, declared: float | None) -> float:
     """A limit on the deviation of a coordinate (rad or m) that goes by the declared variances, in those that the filter
     has; infinite where there is none."""
     return np.inf if declared is None else float(declared * np.sqrt(noise.variance_scale))
-
-
-def unseen_limit(noise: Noise) -> float:
-    """From which deviation of a coordinate on (rad or m) nobody sees it, and it is held: `Noise.unseen_sd` by
-    `limit_sd`, but not so little that the first step of a motion of unknown speed (`BEGUN_SD`) comes near it.
-    """
-    if noise.unseen_sd is None:
-        return np.inf
-    return max(limit_sd(noise, noise.unseen_sd), min(noise.unseen_sd, LEAST_UNSEEN_SD))
 
 
 def prior_factor(noise: Noise) -> float:
