@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
 from dynakin.model.schema import Interval, ModelFile, Segment, kinds_of
-from dynakin.model.state_priors import cluster_covariance, inertia_covariance, state_bounds, state_prior
+from dynakin.model.state_priors import inertia_covariance, places_prior, state_bounds, state_prior
 from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
@@ -103,11 +103,9 @@ class ModelPlan:
         worn_kg = self.worn_kg(priors)
         names = [f"inertia/{name}/{each}" for name in self.inertia for each in INERTIA_NAMES]
         blocks = [inertia_covariance(body, self.reach[name], priors, worn_kg) for name, body in self.inertia.items()]
-        for segment in dict.fromkeys(site.segment for site in self.sites):
-            own = [site for site in self.sites if site.segment == segment]
-            names += [f"marker/{site.name}/{axis}" for site in own for axis in "xyz"]
-            blocks.append(cluster_covariance(np.array([site.position for site in own]), priors))
-        return tuple(names), block_diag(*blocks)
+        places = {site.name: site.position for site in self.sites}
+        on, together = places_prior(places, {site.name: site.segment for site in self.sites}, priors)
+        return (*names, *on), block_diag(*blocks, *together)
 
     def bounds(self, bounds: Bounds, priors: Priors | None = None) -> dict[str, Interval]:
         """Bounds of (9) by the core's names; speeds and accelerations have none."""

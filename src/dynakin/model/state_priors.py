@@ -91,6 +91,20 @@ def inertia_covariance(body: RigidBody, length: float, priors: Priors, worn_kg: 
     return np.asarray(np.diag(sd**2) + worn_kg**2 * np.outer(per_kg, per_kg))
 
 
+def places_prior(
+    places: Mapping[str, Array], segment_of: Mapping[str, str], priors: Priors
+) -> tuple[list[str], list[Array]]:
+    """Of markers' places (3,) on their segments: the core's names of them, segment by segment, and the prior covariance
+    of each segment's (`cluster_covariance`)."""
+    names: list[str] = []
+    blocks: list[Array] = []
+    for segment in dict.fromkeys(segment_of.values()):
+        own = [name for name in places if segment_of[name] == segment]
+        names += [f"marker/{name}/{axis}" for name in own for axis in "xyz"]
+        blocks.append(cluster_covariance(np.array([places[name] for name in own]), priors))
+    return names, blocks
+
+
 def cluster_covariance(places: Array, priors: Priors) -> Array:
     """Prior covariance (3 M, 3 M) of the places (M, 3) of a segment's markers that were measured together: a shift and
     a turn of all of them, and what each has of its own; of one alone as of any marker."""

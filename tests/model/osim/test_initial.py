@@ -12,6 +12,7 @@ import pytest
 import dynakin
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.filter.augment import initial_covariance
 from dynakin.filter.systematic import Systematic
 from dynakin.messages import Message
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -20,9 +21,11 @@ from dynakin.model.opensim.calibrate import limits_of
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import skin_of
+from dynakin.model.state_priors import cluster_covariance
 from dynakin.recordings.recording import Recording
 from dynakin.settings import presets
-from dynakin.settings.model import OpenSimOptions
+from dynakin.settings.model import OpenSimOptions, Priors
+from dynakin.settings.noise import Noise
 from dynakin.settings.subject import Subject
 from support.osim.files import small_model, version_4
 
@@ -37,6 +40,19 @@ def folder(data_dir: Path) -> Path:
 @pytest.fixture(scope="module")
 def squats(folder: Path) -> Recording:
     return dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
+
+
+def test_markers_of_a_body_are_known_together(folder: Path, squats: Recording) -> None:
+    """What is wrong with their places moves them alike: one that is not seen goes along with the others."""
+    found = load_model(folder / FILE, Subject(mass_kg=60.05)).calibrate(squats)
+    own = [m for m in found.spec.markers if m.segment == "pelvis"]
+    at = [found.names.index(f"marker/{m.name}/{axis}") for m in own for axis in "xyz"]
+    expected = cluster_covariance(np.array([m.position for m in own]), Priors())
+    assert len(own) > 3
+    np.testing.assert_allclose(initial_covariance(found, Noise())[np.ix_(at, at)], expected, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(found.sd0[at] ** 2, np.diag(expected))
+    kept = load_model(folder / FILE, Subject(mass_kg=60.05), opensim=OpenSimOptions(marker_places="kept"))
+    assert kept.calibrate(squats).joint_prior is None
 
 
 def test_everything_from_the_file_but_mass_and_posture(folder: Path, squats: Recording) -> None:

@@ -38,6 +38,11 @@ class JointPrior:
     names: tuple[str, ...]
     covariance: Array
 
+    @property
+    def sd(self) -> dict[str, float]:
+        """Standard deviation of each by itself."""
+        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
     def with_known(self, other: JointPrior) -> JointPrior:
         """With what is known otherwise of some of the elements, or of others."""
         kept = [k for k, name in enumerate(self.names) if name not in other.names]

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.messages import note
-from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure, starting_state
+from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior, first_centre_of_pressure, starting_state
 from dynakin.model.calibration.pose_start import start_posture
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.opensim.calibrate import (
@@ -34,7 +35,7 @@ from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import independent_coordinates, moved_by, to_spec, unseen
 from dynakin.model.schema import kinds_of
-from dynakin.model.state_priors import state_bounds, state_prior
+from dynakin.model.state_priors import places_prior, state_bounds, state_prior
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
 from dynakin.settings.model import Bounds, OpenSimOptions, Priors
@@ -197,10 +198,12 @@ class OpenSimDefinition:
         skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
         kinds, known = kinds_of(spec.segments), priors or Priors()
         known = known.changed(marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
+        names, blocks = places_prior(places, {marker.name: marker.body for marker, _ in chosen}, known)
+        together = JointPrior(tuple(names), block_diag(*blocks))
         state, said = starting_state(
             spec,
             bounds=state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds()),
-            prior=state_prior(kinds, lengths, {}, places, bodies, reach, known),
+            prior=state_prior(kinds, lengths, {}, places, bodies, reach, known) | together.sd,
             table=table,
             speeds={},
         )
@@ -227,6 +230,7 @@ class OpenSimDefinition:
             unmarked_kg=sum(bodies[name].mass for name in moved_by(source, lock)),
             held=dict.fromkeys(lock, "it moves no measured marker"),
             coupled=coupled_of(source),
+            joint_prior=None if kept else together,
         )
 
 
