@@ -46,7 +46,19 @@ def with_forces(
     return recording.with_plates(tuple(of(k, plate) for k, plate in enumerate(recording.plates)))
 
 
-@pytest.mark.parametrize(("motion", "delay_s"), [("gait", 0.03), ("gait", 0.09), ("gait", -0.06), ("squat", 0.04)])
+@pytest.mark.parametrize(
+    ("motion", "delay_s"),
+    [
+        ("gait", 0.03),
+        ("gait", 0.09),
+        ("gait", -0.06),
+        ("squat", 0.04),
+        ("gait", 0.1),  # further than is looked for at first
+        ("gait", 0.25),
+        ("squat", -0.3),
+        ("squat", 0.4),
+    ],
+)
 def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: float) -> None:
     whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
     late = brought_into_step(whole, -delay_s)
