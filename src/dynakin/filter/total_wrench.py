@@ -413,8 +413,9 @@ def _undeclared_in_words(
                 "weight",
                 f"the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
                 f"(by the motion {load + up / GRAVITY_M_S2:.1f} kg): the mass "
-                "is wrong, a plate is missing, plates and markers are more than half a second out of step, or something "
-                f"that no plate measures bears or pulls the person (a seat, a weight, a cable, a rail){unit}. The plates are not used for the total.",
+                "is wrong, a plate is missing, plates and markers are out of step by over half a second, or something "
+                f"that no plate measures bears or pulls the person (a seat, a weight, a cable, a rail){unit}. The "
+                "plates are not used for the total.",
             )
         ), beyond
     spans, sizes, away = list[str](), list[tuple[float, int]](), list[float]()
@@ -458,11 +459,12 @@ def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unsee
     within = MASS_APART + UNSEEN_APART * unseen_kg / mass_kg
     if load is None or abs(load - mass_kg) <= within * mass_kg:
         return None
+    carried = ", or a load is carried ([[loads]]; moments of back and arms are wrong by it)" if load > mass_kg else ""
     return warning(
         "weight",
         f"the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
         f"({100.0 * abs(load - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
-        "mass. Forces, moments and inertia take the error on.",
+        f"mass{carried}. Forces, moments and inertia take the error on.",
     )
 
 
