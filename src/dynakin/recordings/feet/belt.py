@@ -73,7 +73,7 @@ class _Mode(NamedTuple):
     """The velocity (2,) m/s that low markers have most often, of how many, and how many stand still."""
 
     velocity: Array
-    count: int
+    alike: int
     still: int
 
 
@@ -101,7 +101,7 @@ def one_velocity(velocity: Array, low: Flags, body: Array, time: Array) -> Array
     if most is None:
         return None
     mode, size = most.velocity, float(np.linalg.norm(most.velocity))
-    if size < STILL_M_S or most.still > 0.5 * most.count:
+    if size < STILL_M_S or most.still > 0.5 * most.alike:
         return np.zeros(2)
     if time[-1] - time[0] < SEEN_S:
         return None
