@@ -139,7 +139,7 @@ def closure(
 def _all_the_time(ratio: float, judged: Flags, declared: Flags, rate: float) -> bool:
     """Whether so much of the declared mass is a declared contact's: more than a mass is off, and no second without that
     contact shows the mass itself."""
-    return abs(ratio - 1.0) > STATED and np.count_nonzero(judged & ~declared) < LASTING_S * rate
+    return bool(abs(ratio - 1.0) > STATED and np.count_nonzero(judged & ~declared) < LASTING_S * rate)
 
 
 def _too_much(need: Array, have: Array, judged: Flags, weight: float, rate: float) -> float | None:

@@ -175,7 +175,7 @@ class _Misfits(NamedTuple):
 def _misfits(needed: Needed, force: Array, longest_s: float) -> _Misfits:
     """Of forces (T, 3), and delays up to the longest either way."""
     steps = round(longest_s / STEP_S)
-    delays = STEP_S * np.arange(-steps, steps + 1)
+    delays: Array = STEP_S * np.arange(-steps, steps + 1, dtype=np.float64)
     moved = [_later(needed.time, force, delay) for delay in delays]
     if not needed.whole:
         for each in moved:

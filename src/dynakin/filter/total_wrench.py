@@ -292,9 +292,9 @@ def _judged(
     if loads is not None:
         notes += [text for text in loads.messages if text not in loads.reasons]
         reasons += loads.reasons
-    unmeasured = None if all(by_plate) else may.any(axis=1)
+    unmeasured = None if all(by_plate) else np.asarray(may.any(axis=1))
     pulling = [k for k, name in enumerate(names) if name != SEAT]
-    pulls = None if unmeasured is None else may[:, pulling].any(axis=1)
+    pulls = None if unmeasured is None else np.asarray(may[:, pulling].any(axis=1))
     found = closure(initial, recording.time, markers, wrench, claimed, unmeasured, pulls)
     if found is None:
         flies = loads is not None and bool(loads.aloft.all(axis=1).any())  # which weighs nobody
