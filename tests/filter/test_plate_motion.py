@@ -20,6 +20,7 @@ from dynakin.filter.shear import NO_SHEAR, found_shear
 from dynakin.messages import about, warnings_of
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.resampling import low_pass
+from dynakin.results.measures.sources import ABSENT
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.held_out import measured_wrench
@@ -46,7 +47,19 @@ def with_forces(
     return recording.with_plates(tuple(of(k, plate) for k, plate in enumerate(recording.plates)))
 
 
-@pytest.mark.parametrize(("motion", "delay_s"), [("gait", 0.03), ("gait", 0.09), ("gait", -0.06), ("squat", 0.04)])
+@pytest.mark.parametrize(
+    ("motion", "delay_s"),
+    [
+        ("gait", 0.03),
+        ("gait", 0.09),
+        ("gait", -0.06),
+        ("squat", 0.04),
+        ("gait", 0.1),  # further than is looked for at first
+        ("gait", 0.25),
+        ("squat", -0.3),
+        ("squat", 0.4),
+    ],
+)
 def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: float) -> None:
     whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
     late = brought_into_step(whole, -delay_s)
@@ -245,6 +258,17 @@ def test_what_is_carried_in_the_hands_is_said(mass_kg: float) -> None:
     if said:
         (found,) = re.findall("as if about ([0-9]+) kg were carried in the hands", said[0])
         assert abs(int(found) - mass_kg) < 3.0
+
+
+def test_moments_that_bear_what_is_carried_are_absent() -> None:
+    """Elbows were 7 N m off and said to 1."""
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    who = Subject(mass_kg=82.0, height_m=1.75, sex="male")
+    data = Estimator(load_model("fullbody", who)).run(holding(squat, 12.0), lag_s=0.0).data
+    absent = {str(name) for name in data["coordinate"].values[(data["moment_source"].values == ABSENT).all(axis=0)]}
+    assert {"lumbar_extension", "arm_flex_r", "elbow_flex_l"} <= absent
+    assert not absent & {"hip_flexion_r", "knee_angle_l", "ankle_angle_r"}
+    assert data["moments"].sel(coordinate="elbow_flex_l").isnull().all()
 
 
 def forward_of(recording: Recording) -> np.ndarray:

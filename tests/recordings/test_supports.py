@@ -9,7 +9,7 @@ import pytest
 
 from dynakin.arrays import runs
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.belt import one_velocity
+from dynakin.recordings.feet.belt import one_velocity, velocities
 from dynakin.recordings.feet.handover import PASSING_S
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
 from dynakin.recordings.plates.ground_plate import GroundPlate
@@ -283,6 +283,19 @@ def test_a_swing_alone_is_no_belt() -> None:
     velocity, time = np.tile([4.0, 0.0, 0.0], (100, 2, 1)), np.arange(100) / 100.0
     assert one_velocity(velocity[:20], low[:20], body[:20], time[:20]) is None
     np.testing.assert_allclose(one_velocity(velocity, low, body, time), [4.0, 0.0])
+
+
+def test_a_belt_that_carries_one_foot_carries_the_other() -> None:
+    """Of which each low stretch is too short to show a belt: it had no stance, and the whole plate was the other's."""
+    time, body, belt = np.arange(100) / 100.0, np.zeros((100, 3)), np.tile([-1.2, 0.0, 0.0], (100, 2, 1))
+    long, short = np.ones((100, 2), dtype=bool), np.repeat((np.arange(100) % 20 < 12)[:, None], 2, axis=1)
+    slower = belt * (1.15 / 1.2)
+    assert one_velocity(slower, short, body, time) is None
+    for speed in velocities([(slower, short), (belt, long)], body, time):
+        np.testing.assert_allclose(speed, [-1.2, 0.0])
+    assert velocities([(0.5 * belt, short), (belt, long)], body, time)[0] is None  # something else
+    still = velocities([(0.0 * belt, long), (belt, long)], body, time)[0]  # a foot beside the belt
+    np.testing.assert_allclose(still, [0.0, 0.0])
 
 
 def test_feet_that_take_turns_bear_all_of_the_weight() -> None:

@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from dynakin.cli.console import out, print_error, table
+from dynakin.filter.closure import STATED
 from dynakin.messages import about, notes_of
 from dynakin.pipeline.result import Result
 from dynakin.report.findings.finding import Insight
@@ -98,7 +99,10 @@ def _print_moments(console: Console, moments: dict[str, Any]) -> None:
 def _contact_in_words(name: str, found: dict[str, Any]) -> str:
     """What came of a declared contact, and what that rests on."""
     if not found["frames"]:
-        return f"The {name}, declared, bears nothing in this recording."
+        return (
+            f"The {name}, declared, bears nothing in this recording that shows (less than "
+            f"{100.0 * STATED:.0f} % of the weight all the time would pass for a mass that is off)."
+        )
     how = listed([f"{what} in {found[what]}" for what in MEANINGS if found[what]])
     size = ""
     if found["largest_n"] is not None:

@@ -55,5 +55,5 @@ def carried_in_words(carried_kg: float) -> str:
     """A warning."""
     return (
         f"the plates' force moves as if about {carried_kg:.0f} kg were carried in the hands, which the model does not "
-        "have: moments of shoulders, elbows, back and hips are wrong by that."
+        "have: moments of shoulders, elbows and back are wrong by that and not given, those of hips are less sure."
     )

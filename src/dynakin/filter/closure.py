@@ -36,6 +36,10 @@ UNSEEN = np.array([0.5, 0.3, 0.1])
 """What a body whose parts are not all marked may do more, of `EXCESS`, `EDGE` and `LASTING`, by the part of its mass
 that is not: without the upper body's markers (0.38) a walk makes 0.20, for longer than a second 0.03, squats 0.11."""
 _MASS_WITHIN, _OFTEN = 0.15, 0.2
+STATED = 0.03
+"""Where a declared contact may bear all the time: the part of the weight that is still taken for a mass which is
+somewhat off (clothes, shoes), not for the contact. What the contact bears has deviations of some 7 % of the weight
+then (40 N of a force of 30 to 40 N), which such a mass is within."""
 _TOO_MUCH, _STEADY, _TOO_MUCH_S = 1.3, 0.3, 0.3
 """A plate whose scale is wrong, or a load that nobody declared: so many times too much, for 80 % of the time within
 30 % of that. A cable or a rail that pulls a person down changes by more (a flywheel from 1.0 to 1.9)."""
@@ -58,6 +62,7 @@ class Closure:
             within 15 % too seldom to be said.
         limits: parts of the weight from which on, at once and for longer than a second, something is missing.
         too_much: the plates' load over what the motion needs where that is far too large, and the same all the time.
+        steady: what is missing all the time is a declared contact's: its size rests on the mass that was stated.
     """
 
     excess: Array
@@ -67,6 +72,7 @@ class Closure:
     load_ratio: float | None
     limits: tuple[float, float]
     too_much: float | None
+    steady: bool = False
 
     def place(self, frames: slice) -> Array:
         """Where the excess of a stretch acts, (2,) m: X and Z on the ground."""
@@ -75,12 +81,22 @@ class Closure:
         return np.asarray(np.array([push @ about[:, 1], -(push @ about[:, 0])]) / max(float(push @ push), 1e-9))
 
 
-def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array, claimed: Flags) -> Closure | None:
+def closure(
+    initial: CalibratedModel,
+    time: Array,
+    markers: Array,
+    wrench: Array,
+    claimed: Flags,
+    may_bear: Flags | None = None,
+    may_pull: Flags | None = None,
+) -> Closure | None:
     """Compare the plates' sum with the motion of the centre of mass.
 
     Args:
         markers: (T, M, 3) m, ground frame, NaN missing. wrench: (T, 6), the sum over the plates.
         claimed: (T,) frames in which that sum is thought to be all that bears the person; only they are judged.
+        may_bear, may_pull: (T,) frames in which some declared contact without a plate may push the person up, or down;
+            not given: none is declared.
 
     Returns:
         None where nothing can be judged.
@@ -96,6 +112,9 @@ def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array
     need = found.needed_force(initial.weighed_kg)
     ratio = _load_ratio(need[:, 1], wrench[:, 1], judged, weight, round(LASTING_S * rate))
     too_much = _too_much(need[:, 1], wrench[:, 1], judged, weight, rate)
+    declared = may_bear if ratio is None or ratio < 1.0 else may_pull
+    steady = ratio is not None and declared is not None and _all_the_time(ratio, judged, declared, rate)
+    ratio = 1.0 if steady else ratio
     need *= 1.0 if ratio is None else ratio  # a mass that is somewhat wrong is no contact
     missing = np.where(axes, need - wrench[:, :3], 0.0)
     excess = smoothed(missing, judged, rate)
@@ -109,10 +128,18 @@ def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array
         load = float(np.median(wrench[first:end, 1]))
         if end - first > _UNSEEN_S * rate and abs(load - weight) > EXCESS * weight:
             undeclared[first:end] = True
+    if steady and declared is not None:
+        undeclared |= claimed & declared
     return Closure(
         excess, smoothed(about, judged, rate), undeclared, int(np.sum(claimed & ~judged)), ratio,
-        (float(large), float(lasting)), too_much,
+        (float(large), float(lasting)), too_much, steady,
     )  # fmt: skip
+
+
+def _all_the_time(ratio: float, judged: Flags, declared: Flags, rate: float) -> bool:
+    """Whether so much of the declared mass is a declared contact's: more than a mass is off, and no second without that
+    contact shows the mass itself."""
+    return bool(abs(ratio - 1.0) > STATED and np.count_nonzero(judged & ~declared) < LASTING_S * rate)
 
 
 def _too_much(need: Array, have: Array, judged: Flags, weight: float, rate: float) -> float | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -42,6 +43,11 @@ LONGEST_LEGS_S, LEAST_LEGS_S, COARSE_LEGS_S = 0.15, 0.025, 0.01
 """The same of a body whose trunk no marker shows, by the vertical force alone: it needs no lean, and the trunk goes up
 and down with the pelvis. In step the minimum lies at 0 to 10 ms in 8 simulated walks and squats and 4 real recordings
 without their trunks' markers, at -10 in one whose whole body says 9, at 10 to 20 in 3 that have no others."""
+WIDE_S, EVIDENT, APART, WIDE_JUDGED_S = 0.5, 0.4, 1.5, 1.0
+"""Where the force fits best at the end of that range, or nowhere in it, longer delays are looked for. One is believed
+where its misfit is so much less than in step (0.09 to 0.12 of walks that were moved by 0.1 to 0.3 s), no delay more
+than `LONGEST_S` from it is as near as so many times its misfit (a step later a walk's force is nearly the same), and so
+much is judged."""
 LESS = 0.75
 """So much less must the sum be off what the motion needs once it is in step; 0.12 to 0.76 where plates were moved by
 15 ms and more, 0.64 and more of recordings in step."""
@@ -118,16 +124,31 @@ class Needed:
 def plates_delay(needed: Needed, force: Array) -> Delay | None:
     """By how much plates lag whose sum (T, 3) N is known where it is no NaN; None where they are in step, or nothing
     can be said."""
-    delays, misfits, judged = _misfits(needed, force)
-    k, now = int(np.argmin(misfits)), misfits[len(delays) // 2]
-    if not 0 < k < len(delays) - 1 or not np.isfinite(misfits[k - 1 : k + 2]).all():
+    longest = LONGEST_S if needed.whole else LONGEST_LEGS_S
+    found = _misfits(needed, force, longest)
+    least, ends = found.misfit.min(), found.misfit[[0, -1]].min()
+    if least < ends and least <= NEAR * needed.weight:
+        return _fitting(needed, found, LESS)
+    if not needed.judged_s(force) >= WIDE_JUDGED_S:
         return None
-    before, least, after = misfits[k - 1 : k + 2]
-    delay = float(delays[k] + 0.5 * STEP_S * (before - after) / max(before - 2.0 * least + after, 1e-12))
+    found = _misfits(needed, force, WIDE_S)
+    k = int(np.argmin(found.misfit))
+    others = found.misfit[np.abs(found.delay - found.delay[k]) > longest]
+    return _fitting(needed, found, EVIDENT) if others.min() > APART * found.misfit[k] else None
+
+
+def _fitting(needed: Needed, found: _Misfits, less: float) -> Delay | None:
+    """The delay with which the force fits what the motion needs, by ``less`` times as much as in step; None where there
+    is none within the range."""
+    k, now = int(np.argmin(found.misfit)), found.misfit[len(found.delay) // 2]
+    if not 0 < k < len(found.delay) - 1 or not np.isfinite(found.misfit[k - 1 : k + 2]).all():
+        return None
+    before, least, after = found.misfit[k - 1 : k + 2]
+    delay = float(found.delay[k] + 0.5 * STEP_S * (before - after) / max(before - 2.0 * least + after, 1e-12))
     shortest, sd_s = (LEAST_S, COARSE_S) if needed.whole else (LEAST_LEGS_S, COARSE_LEGS_S)
-    if abs(delay) < shortest or least > LESS * now or least > NEAR * needed.weight:
+    if abs(delay) < shortest or least > less * now or least > NEAR * needed.weight:
         return None
-    return Delay(delay, sd_s) if judged[k] > KEPT * needed.judged_s(force) else None
+    return Delay(delay, sd_s) if found.judged_s[k] > KEPT * found.judged_s[len(found.delay) // 2] else None
 
 
 def hides_clock(needed: Needed, force: Array) -> bool:
@@ -137,21 +158,30 @@ def hides_clock(needed: Needed, force: Array) -> bool:
         return False
     if force[known, 1].std() < VIGOROUS * needed.weight:
         return False
-    _, misfits, _ = _misfits(needed, force)
+    misfits = _misfits(needed, force, LONGEST_LEGS_S).misfit
     middle, by = len(misfits) // 2, round(2.0 * LEAST_LEGS_S / STEP_S)
     least, aside = misfits.min(), min(misfits[middle - by], misfits[middle + by])
     return bool(least > LESS * aside or least > NEAR * needed.weight)
 
 
-def _misfits(needed: Needed, force: Array) -> tuple[Array, Array, list[float]]:
-    """Delays, s, the misfit of forces (T, 3) that are taken so much later, and how long it was judged."""
-    longest = LONGEST_S if needed.whole else LONGEST_LEGS_S
-    delays = np.arange(-longest, longest + 0.5 * STEP_S, STEP_S)
+class _Misfits(NamedTuple):
+    """Delays, s, the misfit of forces that are taken so much later, N, and how long it was judged, s."""
+
+    delay: Array
+    misfit: Array
+    judged_s: Array
+
+
+def _misfits(needed: Needed, force: Array, longest_s: float) -> _Misfits:
+    """Of forces (T, 3), and delays up to the longest either way."""
+    steps = round(longest_s / STEP_S)
+    delays: Array = STEP_S * np.arange(-steps, steps + 1, dtype=np.float64)
     moved = [_later(needed.time, force, delay) for delay in delays]
     if not needed.whole:
         for each in moved:
             each[:, [0, 2]] = np.where(np.isfinite(each[:, [1]]), needed.force[:, [0, 2]], np.nan)
-    return delays, np.array([needed.misfit(each) for each in moved]), [needed.judged_s(each) for each in moved]
+    misfits = np.array([needed.misfit(each) for each in moved])
+    return _Misfits(delays, misfits, np.array([needed.judged_s(each) for each in moved]))
 
 
 def out_of_step_in_words(delay_s: float, sd_s: float) -> str:

@@ -42,6 +42,7 @@ def with_sources(
     unmarked: Collection[str] = (),
     hidden: Hidden | None = None,
     impossible: Flags | None = None,
+    carried: bool = False,
 ) -> xr.Dataset:
     """The dataset of an estimate with ``foot_source``, ``moment_source`` and ``joint_source``, and NaN where absent.
 
@@ -60,6 +61,7 @@ def with_sources(
         hidden: as of `out_of_sight`: while nothing of a segment is seen, nor of what hangs on it, its joint's moments
             are absent and nothing is known of its angles.
         impossible: (T,) frames whose derived forces are none that the ground gives: these are absent.
+        carried: whether the hands carry what the model does not have: what bears it (arms and back) is absent.
     """
     import xarray as xr  # as in `assemble`
 
@@ -90,9 +92,11 @@ def with_sources(
         joints[_beyond(feet, soles, segments, parents)] = ABSENT
     gone = _gone(hidden or {}, segments, parents, len(joints))
     joints[gone] = ABSENT
+    if carried:
+        joints[:, _over_the_legs([segments.index(name) for name in soles], parents)] = ABSENT
     moments[joints[:, moved] == ABSENT] = ABSENT
     moments[:, np.isin(data["coordinate"].values, list(held))] = ABSENT
-    known, carried = moments != ABSENT, joints != ABSENT
+    known, borne = moments != ABSENT, joints != ABSENT
     found["moment_source"] = (("time", "coordinate"), moments.astype(np.uint8))
     found["joint_source"] = (("time", "joint"), joints.astype(np.uint8))
     shown = ~np.isin(data["coordinate"].values, list(held)) & ~gone[:, moved]
@@ -102,7 +106,7 @@ def with_sources(
             found[name] = data[name].where(seen)  # held where nobody sees it is not known for sure
     for name in ("moments", "moments_sd"):
         found[name] = data[name].where(xr.DataArray(known, dims=("time", "coordinate")))
-    found["joint_loads"] = data["joint_loads"].where(xr.DataArray(carried, dims=("time", "joint")))
+    found["joint_loads"] = data["joint_loads"].where(xr.DataArray(borne, dims=("time", "joint")))
     return data.assign(found)  # all at once: each time takes 10 ms
 
 
@@ -172,12 +176,12 @@ class ContactSources:
         """(T, C) coordinates of which nothing is seen that they move, by their segments (`out_of_sight`)."""
         return _gone(hidden, self._segments, self._parents, frames)[:, self._moved]
 
-    def moments(self, feet: ContactLoads | None, *, refused: bool = False) -> Codes:
+    def moments(self, feet: ContactLoads | None, *, refused: bool = False, carried: bool = False) -> Codes:
         """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody
         knows.
 
         Args:
-            refused: what the plates say was.
+            refused: what the plates say was. carried: as of `with_sources`.
         """
         if feet is None:
             return np.where(self._held, ABSENT, MEASURED).astype(np.uint8)[None]
@@ -187,6 +191,8 @@ class ContactSources:
         joints = _behind(contacts, at, self._parents)
         joints[np.ix_(undeclared, ~self._legs)] = ABSENT
         joints[_beyond(feet, self._soles, self._segments, self._parents)] = ABSENT
+        if carried:
+            joints[:, _over_the_legs([self._segments.index(name) for name in self._soles], self._parents)] = ABSENT
         return np.where(self._held, ABSENT, joints[:, self._moved]).astype(np.uint8)
 
 
@@ -230,6 +236,18 @@ def _beyond(feet: ContactLoads, soles: Collection[str], segments: list[str], par
     for k, parent in enumerate(parents):  # parents stand before their children
         if parent >= 0:
             found[:, k] = bears.get(int(parent), found[:, parent])
+    return found
+
+
+def _over_the_legs(at: list[int], parents: npt.NDArray[np.int_]) -> Flags:
+    """(J,) segments of the trunk and the arms: all but the root and those of a leg."""
+    found = np.asarray(parents >= 0)
+    for k, parent in enumerate(parents):  # what hangs on a foot
+        found[k] &= not (k in at or parent in at)
+    for segment in at:
+        while segment >= 0:
+            found[segment] = False
+            segment = int(parents[segment])
     return found
 
 

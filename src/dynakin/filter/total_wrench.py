@@ -40,6 +40,7 @@ from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.weight import likely_unit
+from dynakin.settings.contacts import SEAT
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -291,7 +292,10 @@ def _judged(
     if loads is not None:
         notes += [text for text in loads.messages if text not in loads.reasons]
         reasons += loads.reasons
-    found = closure(initial, recording.time, markers, wrench, claimed)
+    unmeasured = None if all(by_plate) else np.asarray(may.any(axis=1))
+    pulling = [k for k, name in enumerate(names) if name != SEAT]
+    pulls = None if unmeasured is None else np.asarray(may[:, pulling].any(axis=1))
+    found = closure(initial, recording.time, markers, wrench, claimed, unmeasured, pulls)
     if found is None:
         flies = loads is not None and bool(loads.aloft.all(axis=1).any())  # which weighs nobody
         foreign = None if flies or names else _foreign_load(check, wrench, claimed, initial, tolerance)
@@ -378,9 +382,10 @@ def _declared_in_words(found: Closure, bears: Flags, names: list[str], time: Arr
     ]
     excess = np.abs(found.excess[bears.any(axis=1)])
     size = f" (up to {np.nanmax(excess):.0f} N by the motion)" if np.isfinite(excess).any() else ""
+    rests = " What is lacking all the time rests on the mass (--mass), as do the deviations." if found.steady else ""
     return (
         f"Declared contacts bear what the plates lack{size}: {' and '.join(spans)}. The total wrench is not measured "
-        "there; what depends on these contacts is derived from the motion."
+        f"there; what depends on these contacts is derived from the motion.{rests}"
     )
 
 
@@ -408,8 +413,9 @@ def _undeclared_in_words(
                 "weight",
                 f"the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
                 f"(by the motion {load + up / GRAVITY_M_S2:.1f} kg): the mass "
-                "is wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, "
-                f"a weight, a cable, a rail){unit}. The plates are not used for the total.",
+                "is wrong, a plate is missing, plates and markers are out of step by over half a second, or something "
+                f"that no plate measures bears or pulls the person (a seat, a weight, a cable, a rail){unit}. The "
+                "plates are not used for the total.",
             )
         ), beyond
     spans, sizes, away = list[str](), list[tuple[float, int]](), list[float]()
@@ -453,11 +459,12 @@ def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unsee
     within = MASS_APART + UNSEEN_APART * unseen_kg / mass_kg
     if load is None or abs(load - mass_kg) <= within * mass_kg:
         return None
+    carried = ", or a load is carried ([[loads]]; moments of back and arms are wrong by it)" if load > mass_kg else ""
     return warning(
         "weight",
         f"the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
         f"({100.0 * abs(load - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
-        "mass. Forces, moments and inertia take the error on.",
+        f"mass{carried}. Forces, moments and inertia take the error on.",
     )
 
 

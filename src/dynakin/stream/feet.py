@@ -15,7 +15,7 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.declared import may_bear
 from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.belt import WINDOW_S, one_velocity
+from dynakin.recordings.feet.belt import WINDOW_S, velocities
 from dynakin.recordings.feet.contact import (
     AFTER_S,
     ALOFT_M,
@@ -374,9 +374,9 @@ class _Belts:
         time = np.array([at for at, _, _ in self._kept])
         every, lows = np.stack([v for _, v, _ in self._kept]), np.stack([b for _, _, b in self._kept])
         body = np.median(every, axis=1)
-        for f, markers in enumerate(own):
-            markers = markers[markers < every.shape[1]]
-            found = one_velocity(every[:, markers], lows[:, markers], body, time) if len(markers) else None
+        there = [markers[markers < every.shape[1]] for markers in own]
+        feet = [(every[:, markers], lows[:, markers]) for markers in there]
+        for f, found in enumerate(velocities(feet, body, time)):
             if found is not None:
                 self.velocity[f] = found
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import runs, widened
-from dynakin.recordings.feet.belt import belt_velocity
+from dynakin.recordings.feet.belt import belt_velocities
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.landmarks import find_marker
@@ -110,9 +110,13 @@ def foot_contacts(
     velocity = ground.vectors_to_ground(marker_velocities(recording))
     body = _middle_velocity(velocity)
     floor = floor_height(recording, ground)
+    seen = foot_places(recording, ground, markers)
+    with np.errstate(invalid="ignore"):
+        low = [(velocity[:, columns], _rise(places) < NEAR_SUPPORT_M) for columns, places in seen.values()]
+    belts = belt_velocities(low, body, recording.time)
     feet = {
-        foot: _Foot(places, velocity[:, columns], body, recording, floor, plates)
-        for foot, (columns, places) in foot_places(recording, ground, markers).items()
+        foot: _Foot(places, velocity[:, columns], belt, recording, floor, plates)
+        for (foot, (columns, places)), belt in zip(seen.items(), belts, strict=True)
     }
     _settle(list(feet.values()))
     return {name: foot.contact() for name, foot in feet.items()}
@@ -158,6 +162,16 @@ def _middle_velocity(velocity: Array) -> Array:
     return found
 
 
+def _flat(places: Array) -> Array:
+    """(K,) heights of a foot's markers (T, K, 3), standing flat."""
+    return np.asarray(np.nanpercentile(places[:, :, 1], 5.0, axis=0))
+
+
+def _rise(places: Array) -> Array:
+    """(T, K) how far they are above that."""
+    return np.asarray(places[:, :, 1] - _flat(places))
+
+
 class _Foot:
     """One foot while its contact is worked out."""
 
@@ -165,7 +179,7 @@ class _Foot:
         self,
         places: Array,
         velocity: Array,
-        body: Array,
+        belt: Array,
         recording: Recording,
         floor_m: float,
         plates: Sequence[GroundPlate],
@@ -173,10 +187,9 @@ class _Foot:
         self.places, self.plates, self.floor_m = places, plates, floor_m
         self.rate, n = recording.rate, recording.n_frames
         self.frames = (lambda seconds: max(1, round(seconds * self.rate))) if n > 1 else (lambda seconds: 1)
-        self.flat = np.nanpercentile(places[:, :, 1], 5.0, axis=0)  # (K,) heights of the markers, standing flat
-        self.rise = places[:, :, 1] - self.flat
+        self.flat, self.belt = _flat(places), belt
+        self.rise = _rise(places)
         with np.errstate(invalid="ignore"):
-            self.belt = belt_velocity(velocity, self.rise < NEAR_SUPPORT_M, body, recording.time)
             against = velocity - np.stack([self.belt[:, 0], np.zeros(n), self.belt[:, 1]], axis=1)[:, None]
             self.speed = np.linalg.norm(against, axis=2)
             self.slow = self.speed < SLOW_M_S
