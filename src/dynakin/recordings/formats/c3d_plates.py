@@ -23,6 +23,7 @@ from dynakin.recordings.formats.c3d_zero import zero_frames, zeroed
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
+from dynakin.recordings.plates.stuck import frozen, frozen_in_words
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
 from dynakin.units import force_factor, length_factor, moment_factor
@@ -91,7 +92,7 @@ def read_plates(
     for k in range(int(used)):
         name = f"plate {k + 1}"
         try:
-            raw, said = _raw(name, parameters, k, analog, step, markers, unit_m)
+            raw, said = _raw(name, parameters, k, analog, (float(time[0]), step), markers, unit_m)
             check_wrench(name, analog_time, raw.force, raw.moment, "")
         except RecordingError as error:
             why = str(error).removeprefix(": ").removeprefix(f"{name} ")
@@ -120,13 +121,20 @@ def read_plates(
 
 
 def _raw(
-    name: str, parameters: Parameters, k: int, analog: Array, step_s: float, markers: Array, unit_m: float
+    name: str,
+    parameters: Parameters,
+    k: int,
+    analog: Array,
+    clock: tuple[float, float],
+    markers: Array,
+    unit_m: float,
 ) -> tuple[_Raw, list[Message]]:
-    """Plate k, and notes; step_s: between samples.
+    """Plate k, and notes; clock: time of the first sample and between samples, s.
 
     Raises:
         RecordingError: why it cannot be read.
     """
+    start_s, step_s = clock
     types = parameters.array("FORCE_PLATFORM", "TYPE").ravel()
     found = float(types[k]) if k < len(types) else 0.0
     if found not in TYPES:
@@ -183,6 +191,9 @@ def _raw(
             )
         )
         force[ended], moment[ended] = np.nan, np.nan
+    hung = frozen(analog[channels].T, force[:, 2], 1.0 / step_s)
+    notes += frozen_in_words(name, np.arange(len(hung)) * step_s + start_s, hung)
+    force[hung], moment[hung] = np.nan, np.nan
     force_L = force @ R_LP.T
     moment_L = moment @ R_LP.T + np.cross(centre, force_L)
     return _Raw(name, force_L, moment_L, Surface(centre, normal), corners), notes
