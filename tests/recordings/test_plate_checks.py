@@ -89,6 +89,12 @@ def test_plates_that_nobody_loads_are_left_out_with_a_warning_unless_they_lie_el
     )
 
 
+def test_a_threshold_that_empties_the_plates_is_named() -> None:
+    found = check(replace(standing(1.0), read_with={"force_threshold_n": 5000.0}))
+    (said,) = warnings(found)
+    assert "--force-threshold-n) takes all below 5000 N for nothing" in str(said)
+
+
 @pytest.mark.parametrize(("shift_m", "weighs"), [(0.0, True), (-0.25, False)])
 def test_who_stands_over_a_plates_edge_is_not_weighed(shift_m: float, weighs: bool) -> None:
     made = standing(70.0)

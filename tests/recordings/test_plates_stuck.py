@@ -9,6 +9,8 @@ import pytest
 
 from dynakin.messages import warnings_of
 from dynakin.recordings.formats.c3d import read_c3d
+from dynakin.recordings.formats.c3d_parameters import Parameters
+from dynakin.recordings.formats.c3d_plates import shared_channels
 from dynakin.recordings.plates.stuck import frozen, without_dead_channels
 from dynakin.recordings.recording import Plate, Recording
 from support.made_recordings import write_c3d
@@ -129,3 +131,12 @@ def test_frozen_samples_of_a_c3d_are_not_measured(tmp_path: Path) -> None:
     assert said.text.startswith("plate 1 repeats one and the same row while somebody stands on it, from 0.70 to 0.90 s")
     unknown = np.isnan(found.plates[0].force[:, 2])
     assert unknown[71:90].all() and not unknown[:55].any() and not unknown[105:].any()
+
+
+@pytest.mark.parametrize(("second", "shared"), [([7, 8, 9, 10, 11, 12], False), ([7, 8, 3, 4, 11, 12], True)])
+def test_plates_that_share_channels_are_named(second: list[int], shared: bool) -> None:
+    listed = {"CHANNEL": {"value": np.array([[1, 2, 3, 4, 5, 6], second]).T}, "TYPE": {"value": [2, 2]}}
+    said = shared_channels(Parameters({"FORCE_PLATFORM": listed}), ["plate 1", "plate 2"])
+    assert [each.text.startswith("plate 2 lists the analog channels of plate 1 (numbers 3, 4 ") for each in said] == (
+        [True] if shared else []
+    )

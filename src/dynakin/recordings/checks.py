@@ -183,6 +183,13 @@ def _idle(
             f"the plates carry nobody in the {np.count_nonzero(known)} of {len(known)} frames in which they are "
             f"measured (they read {most:.1f} N at most): {without}.",
         )
+    threshold = recording.read_with.get("force_threshold_n")
+    if threshold is not None and threshold > JUDGED_N:
+        return warning(
+            "plates",
+            f"the plates carry nobody in this recording: force_threshold_n (--force-threshold-n) takes all below "
+            f"{threshold:g} N for nothing: {without}. Leave it out, or give the plates' noise (10 N, say).",
+        )
     unit = likely_unit(while_loaded(np.sum(pushes, axis=0)), steps_kg)
     perhaps = f", and whether they are in {unit}, not N" if unit else ""
     return warning(

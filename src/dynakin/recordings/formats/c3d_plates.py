@@ -100,6 +100,7 @@ def read_plates(
             continue
         raws.append(raw)
         notes += said
+    notes += shared_channels(parameters, [raw.name for raw in raws])
     turned = pulling([raw.force @ raw.surface.normal for raw in raws])
     notes += turned_in_words([raw.name for raw in raws], turned)
     raws = [
@@ -208,6 +209,29 @@ def _channels(parameters: Parameters, k: int, wanted: int, count: int) -> list[i
         said = ", ".join(f"{number:g}" for number in numbers)
         raise RecordingError(f"lists channels [{said}], expected {wanted} of 1 to {count}")
     return [int(number) - 1 for number in numbers]
+
+
+def shared_channels(parameters: Parameters, names: Sequence[str]) -> list[Message]:
+    """Warnings of plates that list a channel of a plate before them: it is not both plates'."""
+    listed = parameters.array("FORCE_PLATFORM", "CHANNEL")
+    types = parameters.array("FORCE_PLATFORM", "TYPE").ravel()
+    found, owners = list[Message](), dict[float, str]()
+    for name in names:
+        k = int(name.split()[1]) - 1
+        own = listed.reshape(listed.shape[0], -1)[: TYPES[int(types[k])].channels, k].tolist()
+        if shared := [channel for channel in own if channel in owners]:
+            numbers = ", ".join(f"{channel:g}" for channel in shared)
+            others = " and ".join(dict.fromkeys(owners[channel] for channel in shared))
+            found.append(
+                warning(
+                    "plates",
+                    f"{name} lists the analog channels of {others} (numbers {numbers} in FORCE_PLATFORM:CHANNEL): at "
+                    "most one of these plates is measured. Correct the list in the file.",
+                )
+            )
+        for channel in own:
+            owners.setdefault(channel, name)
+    return found
 
 
 def _slice(values: Array, k: int, size: int, key: str) -> Array:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
-from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, parse_column
+from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, other_unit, parse_column
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.limits import check_wrench
@@ -43,6 +43,11 @@ def plates_from_table(table: Table) -> tuple[tuple[Plate, ...], tuple[Message, .
         RecordingError: no ground-force columns, or some of a plate's are missing.
     """
     groups, others = group_columns(table.names)
+    for name in table.names:
+        if (unit := other_unit(name)) is not None:
+            raise RecordingError(
+                f"{table.path}: column {name!r} is in {unit!r}, expected forces in N, points in m and moments in N m"
+            )
     if not groups:
         raise RecordingError(
             f"{table.path}: no ground force columns, expected names such as ground_force_vx, "
