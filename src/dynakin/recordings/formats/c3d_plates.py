@@ -193,7 +193,7 @@ def _raw(
         )
         force[ended], moment[ended] = np.nan, np.nan
     hung = frozen(analog[channels].T, force[:, 2], 1.0 / step_s)
-    notes += frozen_in_words(name, np.arange(len(hung)) * step_s + start_s, hung)
+    notes += frozen_in_words(name, np.asarray(np.arange(len(hung)) * step_s + start_s, dtype=float), hung)
     force[hung], moment[hung] = np.nan, np.nan
     force_L = force @ R_LP.T
     moment_L = moment @ R_LP.T + np.cross(centre, force_L)

@@ -164,5 +164,6 @@ def without_frames(plate: Plate, lost: Flags) -> Plate:
     """A plate that is not measured (NaN) in these frames (T,)."""
     if not lost.any():
         return plate
-    keys = ("force", "moment", "cop", "free_moment")
-    return replace(plate, **{key: np.where(lost[:, None], np.nan, getattr(plate, key)) for key in keys})
+    values = (plate.force, plate.moment, plate.cop, plate.free_moment)
+    force, moment, cop, free = (np.where(lost[:, None], np.nan, value) for value in values)
+    return replace(plate, force=force, moment=moment, cop=cop, free_moment=free)
