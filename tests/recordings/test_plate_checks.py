@@ -281,3 +281,11 @@ def test_recording_window_marker_and_shapes() -> None:
         Recording("a", None, np.arange(3.0), ("A",), np.zeros((2, 1, 3)))
     with pytest.raises(RecordingError, match="plate 1 has arrays of shapes"):
         recording.with_plates((part.plates[0],))
+
+
+def test_plates_that_are_never_measured_together_are_said_so() -> None:
+    made = standing(70.0)
+    first = made.plates[0]
+    made = made.with_plates((replace(first, force=np.full_like(first.force, np.nan)), *made.plates[1:]))
+    found = check(made)
+    assert found.unused and any("measured together in no frame" in str(said) for said in warnings(found))

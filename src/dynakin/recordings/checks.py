@@ -91,6 +91,12 @@ def check_plates(
         return PlateCheck(None, None, (), "no force plates in this recording, expected at least one")
     findings = Findings()
     standing = _on_plates(standing_window(recording), recording, ground)
+    if not np.all([np.isfinite(plate.force).all(axis=1) for plate in recording.plates], axis=0).any():
+        findings.warn(
+            "the plates are measured together in no frame: it is run as one without plates, and the ground reaction "
+            "follows from the motion."
+        )
+        return PlateCheck(None, None, tuple(findings.messages), None, unused=True)
     frames = standing if standing is not None else slice(None)
     places = _feet(recording, ground, foot_markers or {}, findings)
     feet = {foot: place[:, :, [0, 2]] for foot, place in places.items()}
