@@ -89,6 +89,12 @@ def test_plates_that_nobody_loads_are_left_out_with_a_warning_unless_they_lie_el
     )
 
 
+def test_a_threshold_that_empties_the_plates_is_named() -> None:
+    found = check(replace(standing(1.0), read_with={"force_threshold_n": 5000.0}))
+    (said,) = warnings(found)
+    assert "--force-threshold-n) takes all below 5000 N for nothing" in str(said)
+
+
 @pytest.mark.parametrize(("shift_m", "weighs"), [(0.0, True), (-0.25, False)])
 def test_who_stands_over_a_plates_edge_is_not_weighed(shift_m: float, weighs: bool) -> None:
     made = standing(70.0)
@@ -275,3 +281,11 @@ def test_recording_window_marker_and_shapes() -> None:
         Recording("a", None, np.arange(3.0), ("A",), np.zeros((2, 1, 3)))
     with pytest.raises(RecordingError, match="plate 1 has arrays of shapes"):
         recording.with_plates((part.plates[0],))
+
+
+def test_plates_that_are_never_measured_together_are_said_so() -> None:
+    made = standing(70.0)
+    first = made.plates[0]
+    made = made.with_plates((replace(first, force=np.full_like(first.force, np.nan)), *made.plates[1:]))
+    found = check(made)
+    assert found.unused and any("measured together in no frame" in str(said) for said in warnings(found))

@@ -96,6 +96,9 @@ def test_more_rows_than_the_header_says_are_used_and_said(tmp_path: Path) -> Non
         ("ground_force_vx_r", ("r", "force", "x")),
         ("ground_force_calcn_r_vx", ("calcn_r", "force", "x")),
         ("FP1_vx", ("1", "force", "x")),
+        ("ground_force_1_vx (N)", ("1", "force", "x")),
+        ("ground_force_1_px [m]", ("1", "point", "x")),
+        ("ground_force_1_mx (N m)", ("1", "torque", "x")),
         ("FP2.Fy", ("2", "force", "y")),
         ("FP2_mz", ("2", "torque", "z")),
         ("ground_torque_x", ("", "torque", "x")),
@@ -264,3 +267,14 @@ def test_columns_parted_otherwise_are_named_with_what_parts_them(tmp_path: Path,
     with pytest.raises(RecordingError, match=f"found columns parted by {named}, expected tabs or blanks") as error:
         read_table(write(tmp_path, "grf.mot", text))
     assert "ground_force_vx" not in error.value.message
+
+
+def test_a_unit_in_brackets_is_read_or_named(tmp_path: Path) -> None:
+    time = np.arange(11) / 100.0
+    units = {"v": " (N)", "p": " (m)", "m": " (Nm)"}
+    columns = {f"FP1_{key}{units[key[0]]}": value for key, value in QUANTITIES.items()}
+    (plate,) = read(trc(tmp_path, 11), write(tmp_path, "a.mot", grf_text(time, columns))).plates
+    assert plate.name == "plate 1"
+    wrong = {name.replace("(m)", "(mm)"): value for name, value in columns.items()}
+    with pytest.raises(RecordingError, match=r"column 'FP1_px \(mm\)' is in 'mm', expected"):
+        read(trc(tmp_path, 11), write(tmp_path, "b.mot", grf_text(time, wrong)))

@@ -91,6 +91,12 @@ def check_plates(
         return PlateCheck(None, None, (), "no force plates in this recording, expected at least one")
     findings = Findings()
     standing = _on_plates(standing_window(recording), recording, ground)
+    if not np.all([np.isfinite(plate.force).all(axis=1) for plate in recording.plates], axis=0).any():
+        findings.warn(
+            "the plates are measured together in no frame: it is run as one without plates, and the ground reaction "
+            "follows from the motion."
+        )
+        return PlateCheck(None, None, tuple(findings.messages), None, unused=True)
     frames = standing if standing is not None else slice(None)
     places = _feet(recording, ground, foot_markers or {}, findings)
     feet = {foot: place[:, :, [0, 2]] for foot, place in places.items()}
@@ -182,6 +188,13 @@ def _idle(
             "plates",
             f"the plates carry nobody in the {np.count_nonzero(known)} of {len(known)} frames in which they are "
             f"measured (they read {most:.1f} N at most): {without}.",
+        )
+    threshold = recording.read_with.get("force_threshold_n")
+    if threshold is not None and threshold > JUDGED_N:
+        return warning(
+            "plates",
+            f"the plates carry nobody in this recording: force_threshold_n (--force-threshold-n) takes all below "
+            f"{threshold:g} N for nothing: {without}. Leave it out, or give the plates' noise (10 N, say).",
         )
     unit = likely_unit(while_loaded(np.sum(pushes, axis=0)), steps_kg)
     perhaps = f", and whether they are in {unit}, not N" if unit else ""

@@ -18,6 +18,8 @@ from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table, read_table
 from dynakin.recordings.formats.textfile import first_cell, refuse_export
 from dynakin.recordings.formats.trc import read_trc
+from dynakin.recordings.plates.filtered import cuts_into_loads
+from dynakin.recordings.plates.stuck import without_dead_channels
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
 
@@ -84,13 +86,17 @@ def read(
     _check_unit(recording, path)
     if forces is not None:
         recording = attach_forces(recording, read_forces(Path(forces)), options)
+    if plate_filter_hz is not None and not causal and recording.plates:  # what looks back delays, too, which is said
+        raw = read(path, forces, force_threshold_n=force_threshold_n)
+        if (cut := cuts_into_loads(raw, recording, plate_filter_hz)) is not None:
+            recording = replace(recording, notes=(*recording.notes, cut))
     asked = {
         "forces": None if forces is None else str(Path(forces).absolute()),
         "plate_filter_hz": plate_filter_hz,
         "force_threshold_n": force_threshold_n,
     }
     known = {key: value for key, value in asked.items() if value is not None}
-    return replace(recording, read_with=known) if known else recording
+    return without_dead_channels(replace(recording, read_with=known) if known else recording)
 
 
 def _check_unit(recording: Recording, path: Path) -> None:

@@ -60,8 +60,8 @@ class Priors(Called, use_attribute_docstrings=True):
     7 mm off: 4 to 10 mm do, the smaller the better. What skin and flesh do later is not part of it. Of models that
     are no sagittal ones: of markers that are alone on their segment, the others have the three below."""
     cluster_shift_sd_m: Positive = 0.002
-    """Of the same models: all markers of a segment together against the segment. What stands measured is how they lie to
-    each other; where the bone is among them is what landmarks miss, and what an .osim's scaling does."""
+    """Of the same models: all markers of a segment together against the segment. What stands measured is how they lie
+    to each other; where the bone is among them is what landmarks miss, and what an .osim's scaling does."""
     cluster_turn_sd_deg: Positive = 1.0
     """The same, turned about their middle."""
     cluster_marker_sd_m: Positive = 0.0005

@@ -23,6 +23,7 @@ from dynakin.recordings.formats.c3d_zero import zero_frames, zeroed
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
+from dynakin.recordings.plates.stuck import frozen, frozen_in_words
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
 from dynakin.units import force_factor, length_factor, moment_factor
@@ -91,7 +92,7 @@ def read_plates(
     for k in range(int(used)):
         name = f"plate {k + 1}"
         try:
-            raw, said = _raw(name, parameters, k, analog, step, markers, unit_m)
+            raw, said = _raw(name, parameters, k, analog, (float(time[0]), step), markers, unit_m)
             check_wrench(name, analog_time, raw.force, raw.moment, "")
         except RecordingError as error:
             why = str(error).removeprefix(": ").removeprefix(f"{name} ")
@@ -99,6 +100,7 @@ def read_plates(
             continue
         raws.append(raw)
         notes += said
+    notes += shared_channels(parameters, [raw.name for raw in raws])
     turned = pulling([raw.force @ raw.surface.normal for raw in raws])
     notes += turned_in_words([raw.name for raw in raws], turned)
     raws = [
@@ -120,13 +122,20 @@ def read_plates(
 
 
 def _raw(
-    name: str, parameters: Parameters, k: int, analog: Array, step_s: float, markers: Array, unit_m: float
+    name: str,
+    parameters: Parameters,
+    k: int,
+    analog: Array,
+    clock: tuple[float, float],
+    markers: Array,
+    unit_m: float,
 ) -> tuple[_Raw, list[Message]]:
-    """Plate k, and notes; step_s: between samples.
+    """Plate k, and notes; clock: time of the first sample and between samples, s.
 
     Raises:
         RecordingError: why it cannot be read.
     """
+    start_s, step_s = clock
     types = parameters.array("FORCE_PLATFORM", "TYPE").ravel()
     found = float(types[k]) if k < len(types) else 0.0
     if found not in TYPES:
@@ -183,6 +192,9 @@ def _raw(
             )
         )
         force[ended], moment[ended] = np.nan, np.nan
+    hung = frozen(analog[channels].T, force[:, 2], 1.0 / step_s)
+    notes += frozen_in_words(name, np.asarray(np.arange(len(hung)) * step_s + start_s, dtype=float), hung)
+    force[hung], moment[hung] = np.nan, np.nan
     force_L = force @ R_LP.T
     moment_L = moment @ R_LP.T + np.cross(centre, force_L)
     return _Raw(name, force_L, moment_L, Surface(centre, normal), corners), notes
@@ -197,6 +209,29 @@ def _channels(parameters: Parameters, k: int, wanted: int, count: int) -> list[i
         said = ", ".join(f"{number:g}" for number in numbers)
         raise RecordingError(f"lists channels [{said}], expected {wanted} of 1 to {count}")
     return [int(number) - 1 for number in numbers]
+
+
+def shared_channels(parameters: Parameters, names: Sequence[str]) -> list[Message]:
+    """Warnings of plates that list a channel of a plate before them: it is not both plates'."""
+    listed = parameters.array("FORCE_PLATFORM", "CHANNEL")
+    types = parameters.array("FORCE_PLATFORM", "TYPE").ravel()
+    found, owners = list[Message](), dict[float, str]()
+    for name in names:
+        k = int(name.split()[1]) - 1
+        own = listed.reshape(listed.shape[0], -1)[: TYPES[int(types[k])].channels, k].tolist()
+        if shared := [channel for channel in own if channel in owners]:
+            numbers = ", ".join(f"{channel:g}" for channel in shared)
+            others = " and ".join(dict.fromkeys(owners[channel] for channel in shared))
+            found.append(
+                warning(
+                    "plates",
+                    f"{name} lists the analog channels of {others} (numbers {numbers} in FORCE_PLATFORM:CHANNEL): at "
+                    "most one of these plates is measured. Correct the list in the file.",
+                )
+            )
+        for channel in own:
+            owners.setdefault(channel, name)
+    return found
 
 
 def _slice(values: Array, k: int, size: int, key: str) -> Array:

@@ -5,7 +5,8 @@ or the words torque, moment). What else the name holds, a number or a side anywh
 Understood are thus ``ground_force_vx``, ``1_ground_force_vx``, ``ground_force_1_vx``, ``ground_force1_vx``,
 ``l_ground_force_vx``, ``R_ground_force_vx``, ``ground_force_vx_r``, ``ground_force_calcn_r_vx``, ``FP1_vx``,
 ``ground_torque_x``, ``1_ground_torque_x``, ``ground_torque_1_x``, ``ground_force_1_mx``,
-``ground_moment_l_mx``, ``FP1.tx``, ...
+``ground_moment_l_mx``, ``FP1.tx``, ... A unit behind a name, in brackets, is passed over where it is the one that is
+taken (N, m, N m).
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ _FORCE_WORDS = {
 }
 _MOMENT_WORDS = {"torque", "torques", "moment", "moments", "grm"}
 _FILLER = _FORCE_WORDS | {"ground", "reaction", "free", "external"}
+_UNIT = re.compile(r"\s*[\[(]\s*(n|m|n[\s.*·]?m)\s*[\])]\s*$")
 _LAST = re.compile(r"^([vfpmt]?)([xyz])$")
 _WORD_NUMBER = re.compile(r"^([a-z]+)(\d+)$")
 _QUANTITY = {"v": "force", "f": "force", "p": "point", "m": "torque", "t": "torque"}
@@ -43,7 +45,7 @@ class PlateColumns:
 def parse_column(name: str) -> tuple[str, str, str] | None:
     """(plate, quantity, axis) of a ground-force column, None for any other column (``pelvis_tx``, say)."""
     tokens: list[str] = []
-    for token in re.split(r"[_.\-\s]+", name.strip().casefold()):
+    for token in re.split(r"[_.\-\s]+", _UNIT.sub("", name.strip().casefold())):
         number = _WORD_NUMBER.match(token)
         if number and number[1] in _FILLER:
             tokens += [number[1], number[2]]
@@ -65,6 +67,16 @@ def parse_column(name: str) -> tuple[str, str, str] | None:
         return None
     plate = "_".join(re.sub(r"^fp(?=\d)", "", token) for token in rest if token not in _FILLER and token != "fp")
     return plate, quantity, axis
+
+
+def other_unit(name: str) -> str | None:
+    """The unit in brackets behind a ground-force column's name that is not the one that is taken, None without one."""
+    behind = re.search(r"[\[(]([^\[()\]]*)[\])]\s*$", name)
+    parsed = parse_column(name)
+    if behind is None or parsed is None:
+        return None
+    unit = re.sub(r"[\s.*\u00b7]", "", behind[1].casefold())
+    return None if unit == {"force": "n", "point": "m", "torque": "nm"}[parsed[1]] else behind[1]
 
 
 def group_columns(names: tuple[str, ...]) -> tuple[list[PlateColumns], list[str]]:

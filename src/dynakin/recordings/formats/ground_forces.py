@@ -9,14 +9,15 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
-from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, parse_column
+from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, other_unit, parse_column
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
+from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
 from dynakin.recordings.recording import Array, Plate, Recording
-from dynakin.recordings.resampling import ReadOptions, low_pass, resample, same_times
+from dynakin.recordings.resampling import ReadOptions, low_pass, reach_s, resample, same_times, touched
 from dynakin.recordings.times import rate_of, step_of
 
 Flags = npt.NDArray[np.bool_]
@@ -42,6 +43,11 @@ def plates_from_table(table: Table) -> tuple[tuple[Plate, ...], tuple[Message, .
         RecordingError: no ground-force columns, or some of a plate's are missing.
     """
     groups, others = group_columns(table.names)
+    for name in table.names:
+        if (unit := other_unit(name)) is not None:
+            raise RecordingError(
+                f"{table.path}: column {name!r} is in {unit!r}, expected forces in N, points in m and moments in N m"
+            )
     if not groups:
         raise RecordingError(
             f"{table.path}: no ground force columns, expected names such as ground_force_vx, "
@@ -129,6 +135,9 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         text = f"{table.path.name} replaces the {len(recording.plates)} plates of {recording.name}."
         notes += (note("recording", text),)
     untouched = same_times(table.time, recording.time)
+    hung = [_frozen(plate, table.time) for plate in plates]
+    for plate, lost in zip(plates, hung, strict=True):
+        notes += tuple(frozen_in_words(plate.name, table.time, lost))
     covered: Flags = np.ones(recording.n_frames, dtype=bool)
     if not untouched:
         covered = _covered(recording, table)
@@ -140,10 +149,23 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         )
         notes += (note("routine", text),)
     if untouched and options.plate_filter_hz is None and options.force_threshold_n is None:
-        return recording.with_plates(plates, notes)
+        return recording.with_plates(tuple(map(without_frames, plates, hung)), notes)
     time = recording.time[covered]
-    found = [_beyond_rows(_resampled(plate, table, time, options), covered) for plate in plates]
+    reach = reach_s(rate_of(table.time), recording.rate, options.plate_filter_hz)
+    found = [
+        _beyond_rows(
+            without_frames(_resampled(plate, table, time, options), touched(lost, table.time, time, reach)), covered
+        )
+        for plate, lost in zip(plates, hung, strict=True)
+    ]
     return recording.with_plates(tuple(found), notes)
+
+
+def _frozen(plate: Plate, time: Array) -> Flags:
+    """(N,) rows of a plate that repeat the one before, while it is loaded along the axis that carries the most."""
+    rows = np.hstack([plate.force, plate.moment])
+    along = int(np.argmax(np.abs(np.nan_to_num(plate.force)).sum(axis=0)))
+    return frozen(rows, plate.force[:, along], rate_of(time) if len(time) > 1 else 1.0)
 
 
 def _covered(recording: Recording, table: Table) -> Flags:

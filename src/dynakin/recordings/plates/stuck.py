@@ -1,0 +1,169 @@
+"""Plates whose data stand still while the load on them does not: rows that repeat (a logger that hung), and channels
+that are dead (a cable, an export without moments).
+
+Frames are frozen by the data at their own rate, before any filter; channels are dead by the plates at the markers'
+rate. A channel that no plate has is no defect: of vertical forces only, or of a movement in a plane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.arrays import runs
+from dynakin.messages import Message, warning
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
+from dynakin.recordings.recording import Array, Plate, Recording
+
+Flags = npt.NDArray[np.bool_]
+
+FROZEN, FROZEN_S = 5, 0.04
+"""So many equal rows and so long, and so many times as many as the plate usually holds one for (a table brought to a
+higher rate repeats each row)."""
+JUMP, STEPS = 3.0, 5.0
+"""Rows that were frozen come free with a jump: of some channel, more than so many times what it changes by in a row
+next to it, and so many times its smallest change (a file may round, and a person stand still)."""
+PRESS_S, CHANGES = 0.2, 0.2
+"""A press so long, through which the vertical force changes by so large a part of its largest value, moves the other
+forces and the centre of pressure: what stands still then is no person."""
+STILL_N, STILL_M = 1e-5, 1e-4
+"""Part of the largest vertical force, and m, within which a channel is constant: noise alone is 0.1 N and 0.2 mm."""
+
+
+def frozen(rows: Array, push: Array, rate_hz: float) -> Flags:
+    """(N,) rows (N, K) of one plate's channels that repeat the one before while somebody stands on it, by its vertical
+    force (N,) N of either sign."""
+    found = np.zeros(len(rows), dtype=bool)
+    loaded = np.abs(np.nan_to_num(push)) > JUDGED_N
+    if len(rows) < 2 or not loaded.any():
+        return found
+    change = np.abs(np.diff(rows, axis=0))
+    same = (change == 0.0).all(axis=1) & loaded[1:]
+    held = runs(same)  # rows first to end, the end among them
+    if not any(end - first + 1 >= FROZEN for first, end in held):
+        return found
+    lengths = np.ones(len(rows))
+    for first, end in held:
+        lengths[first : end + 1] = end - first + 1
+    usual = float(np.percentile(lengths[loaded], 25.0))
+    smallest = np.min(np.where(change > 0.0, change, np.inf), axis=0)
+    for first, end in held:
+        length = end - first + 1
+        if length < max(FROZEN, FROZEN_S * rate_hz, FROZEN * usual) or end >= len(change):
+            continue
+        near = np.concatenate([change[max(first - 1 - length, 0) : max(first - 1, 0)], change[end + 1 : end + length]])
+        usually = np.nanmedian(near, axis=0) if len(near) else np.zeros(rows.shape[1])
+        jump = change[end]
+        if (jump > np.maximum(JUMP * usually, STEPS * smallest)).any():
+            found[first + 1 : end + 1] = True  # the first of them was measured
+    return found
+
+
+def frozen_in_words(name: str, time: Array, lost: Flags) -> list[Message]:
+    """A warning of a plate some of whose rows (N,) are frozen."""
+    if not lost.any():
+        return []
+    spans = [f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(lost)]
+    more = f" and {len(spans) - 3} more times" if len(spans) > 3 else ""
+    return [
+        warning(
+            "plates",
+            f"{name} repeats one and the same row while somebody stands on it, from {', '.join(spans[:3])}{more}, "
+            "and then jumps: not measured there. Export the forces again, or look whether their recording was "
+            "interrupted.",
+        )
+    ]
+
+
+@dataclass(frozen=True)
+class _Press:
+    """A press of a plate, frames [first, end), and which of its level axes stand still: of the force, of the centre of
+    pressure."""
+
+    plate: int
+    first: int
+    end: int
+    force: tuple[bool, bool]
+    cop: tuple[bool, bool]
+
+
+def without_dead_channels(recording: Recording) -> Recording:
+    """The recording without (NaN) the presses of plates of which a channel is dead, and with a warning for each such
+    plate."""
+    if not recording.plates or recording.n_frames < 2:
+        return recording
+    total = np.nansum([np.abs(np.nan_to_num(plate.force)).sum(axis=0) for plate in recording.plates], axis=0)
+    up = int(np.argmax(total))
+    level = [axis for axis in range(3) if axis != up]
+    presses = [press for p, plate in enumerate(recording.plates) for press in _presses(plate, p, up, level, recording)]
+    if not presses:
+        return recording
+    force, cop = (np.array([getattr(press, what) for press in presses]) for what in ("force", "cop"))
+    none_has = np.all(force, axis=0) & (np.all(cop, axis=0) | np.all(force))  # in a plane, or vertical forces only
+    dead_force = force & ~none_has
+    # Both, or one while that axis' force is alive.
+    dead_cop = cop & (cop.all(axis=1, keepdims=True) | ~np.all(force & cop, axis=0))
+    plates, notes = list(recording.plates), list[Message]()
+    for p, plate in enumerate(recording.plates):
+        own = [k for k, press in enumerate(presses) if press.plate == p and (dead_force[k].any() or dead_cop[k].any())]
+        if not own:
+            continue
+        spans = [(presses[k].first, presses[k].end) for k in own]
+        notes.append(_dead_in_words(recording, plate.name, spans, level, dead_force[own], dead_cop[own]))
+        plates[p] = _without(plate, spans, up)
+    return recording.with_plates(tuple(plates), tuple(notes)) if notes else recording
+
+
+def _presses(plate: Plate, p: int, up: int, level: Sequence[int], recording: Recording) -> list[_Press]:
+    """The presses of a plate that can be judged."""
+    push, found = np.abs(np.nan_to_num(plate.force[:, up])), []
+    for first, end in runs(push > JUDGED_N):
+        own, most = slice(first, end), float(push[first:end].max())
+        if end - first < max(PRESS_S * recording.rate, 3.0) or np.ptp(push[own]) < CHANGES * most:
+            continue
+        places = plate.cop[own][:, level]
+        if not np.isfinite(places).all():
+            continue
+        force, cop = np.ptp(plate.force[own][:, level], axis=0) < STILL_N * most, np.ptp(places, axis=0) < STILL_M
+        found.append(_Press(p, first, end, (bool(force[0]), bool(force[1])), (bool(cop[0]), bool(cop[1]))))
+    return found
+
+
+def _dead_in_words(
+    recording: Recording, name: str, spans: list[tuple[int, int]], level: Sequence[int], force: Flags, cop: Flags
+) -> Message:
+    what = [f"its F{'xyz'[axis]}" for k, axis in enumerate(level) if force[:, k].any()]
+    if cop.any():
+        axes = " and ".join("XYZ"[axis] for k, axis in enumerate(level) if cop[:, k].any())
+        what.append(f"its centre of pressure along {axes}")
+    time = recording.time
+    times = ", ".join(f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in spans[:3])
+    more = f" and {len(spans) - 3} more times" if len(spans) > 3 else ""
+    return warning(
+        "plates",
+        f"{name}: {' and '.join(what)} never change{'s' if len(what) == 1 else ''} while the load on it does, from "
+        f"{times}{more}: a channel is dead or was not exported. Not measured there; look at its channels in "
+        f"{recording.plates_file}.",
+    )
+
+
+def _without(plate: Plate, spans: list[tuple[int, int]], up: int) -> Plate:
+    """The plate without these presses, from where it is loaded at all to where it is left."""
+    lost = np.zeros(len(plate.force), dtype=bool)
+    for first, end in runs(np.abs(np.nan_to_num(plate.force[:, up])) > UNLOADED_N):
+        lost[first:end] = any(first <= a < end for a, _ in spans)
+    for first, end in spans:
+        lost[first:end] = True
+    return without_frames(plate, lost)
+
+
+def without_frames(plate: Plate, lost: Flags) -> Plate:
+    """A plate that is not measured (NaN) in these frames (T,)."""
+    if not lost.any():
+        return plate
+    values = (plate.force, plate.moment, plate.cop, plate.free_moment)
+    force, moment, cop, free = (np.where(lost[:, None], np.nan, value) for value in values)
+    return replace(plate, force=force, moment=moment, cop=cop, free_moment=free)

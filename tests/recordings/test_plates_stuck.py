@@ -1,0 +1,142 @@
+"""Plates whose data stand still under a load that does not: rows that repeat, and channels that are dead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.messages import warnings_of
+from dynakin.recordings.formats.c3d import read_c3d
+from dynakin.recordings.formats.c3d_parameters import Parameters
+from dynakin.recordings.formats.c3d_plates import shared_channels
+from dynakin.recordings.plates.stuck import frozen, without_dead_channels
+from dynakin.recordings.recording import Plate, Recording
+from support.made_recordings import write_c3d
+
+N = 200
+T = np.arange(N) / 100.0
+
+
+def step(start: float) -> Plate:
+    """A foot that rolls over a plate for 0.7 s, the laboratory's y up."""
+    s = np.clip((T - start) / 0.7, 0.0, 1.0)
+    load = np.sin(np.pi * s)
+    force = np.column_stack([-100.0 * np.sin(2 * np.pi * s), 800.0 * load, 20.0 * load * s])
+    return pressed("plate", force, np.column_stack([0.2 * s, 0.0 * s, 0.1 + 0.02 * s**2]))
+
+
+def pressed(name: str, force: np.ndarray, place: np.ndarray) -> Plate:
+    cop = np.where(force[:, 1:2] > 10.0, place, np.nan)
+    return Plate(name, force, np.cross(place, force), cop, np.zeros((N, 3)))
+
+
+def recorded(*plates: Plate) -> Recording:
+    return Recording("made", None, T, ("A",), np.zeros((N, 1, 3)), plates, "m", ())
+
+
+def edited(plate: Plate, force: dict[int, float] | None = None, cop: dict[int, float] | None = None) -> Plate:
+    """A plate some of whose axes are constant."""
+    f, place = plate.force.copy(), np.nan_to_num(plate.cop)
+    for axis, value in (force or {}).items():
+        f[:, axis] = value
+    for axis, value in (cop or {}).items():
+        place[:, axis] = value
+    return pressed("dead", f, place)
+
+
+GOOD = step(0.9)
+
+
+@pytest.mark.parametrize(
+    ("dead", "named"),
+    [
+        (edited(step(0.2), cop={0: 0.1, 2: 0.1}), "its centre of pressure along X and Z never changes"),
+        (edited(step(0.2), cop={2: 0.1}), "its centre of pressure along Z never changes"),
+        (edited(step(0.2), force={0: 0.0}), "its Fx never changes"),
+        (edited(step(0.2), force={0: 0.0, 2: 3.0}), "its Fx and its Fz never change"),
+    ],
+)
+def test_a_dead_channel_is_named_and_its_press_not_measured(dead: Plate, named: str) -> None:
+    found = without_dead_channels(recorded(GOOD, dead))
+    (said,) = warnings_of(found.notes)
+    assert said.text.startswith(f"dead: {named}") and "from 0.22 to 0.8" in said.text
+    assert np.isnan(found.plates[1].force[30:80]).all() and np.isfinite(found.plates[1].force[100:]).all()
+    assert found.plates[0] is GOOD
+
+
+@pytest.mark.parametrize(
+    "plates",
+    [
+        (GOOD, step(0.2)),
+        tuple(edited(step(at), force={0: 0.0, 2: 0.0}) for at in (0.2, 0.9)),  # vertical forces only
+        tuple(edited(step(at), force={2: 0.0}, cop={2: 0.1}) for at in (0.2, 0.9)),  # in a plane
+        (edited(step(0.2), force={2: 0.0}, cop={2: 0.1}),),
+        (pressed("still", np.tile([5.0, 700.0, 2.0], (N, 1)), np.full((N, 3), 0.1)), GOOD),  # made up: nothing moves
+    ],
+)
+def test_what_is_not_recorded_at_all_is_no_dead_channel(plates: tuple[Plate, ...]) -> None:
+    made = recorded(*plates)
+    assert without_dead_channels(made) is made
+
+
+def rows() -> np.ndarray:
+    return np.hstack([GOOD.force, GOOD.moment])
+
+
+def lost_in(data: np.ndarray, rate: float = 100.0) -> np.ndarray:
+    return np.flatnonzero(frozen(data, data[:, 1], rate))
+
+
+def test_rows_that_repeat_and_then_jump_are_frozen() -> None:
+    data = rows()
+    data[110:125] = data[110]
+    np.testing.assert_array_equal(lost_in(data), np.arange(111, 125))
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        rows(),
+        np.repeat(rows()[::10], 10, axis=0),  # brought to a higher rate
+        np.round(rows(), -1),
+        np.tile([0.0, 700.0, 0.0, 1.0, 2.0, 3.0], (N, 1)),
+        np.where(T[:, None] < 1.0, [[0.0, 700.0, 0.0, 1.0, 2.0, 3.0]], 0.0),  # made up: on and off
+        np.round(np.random.default_rng(1).normal(size=(N, 6)).cumsum(axis=0) * 0.05 + 700.0),  # standing, rounded
+    ],
+)
+def test_rows_that_are_held_rounded_or_made_up_are_not_frozen(data: np.ndarray) -> None:
+    assert not len(lost_in(data))
+
+
+def test_frozen_samples_of_a_c3d_are_not_measured(tmp_path: Path) -> None:
+    t = np.arange(10 * N) / 1000.0
+    load = np.clip(np.sin(np.pi * (t - 0.5)), 0.0, None) * (t < 1.5)
+    channels = np.stack([60.0 * load, 5.0 * load**2, -800.0 * load, 40.0 * load, 20.0 * load, 0.0 * t])
+    channels += np.random.default_rng(2).normal(0.0, 0.3, channels.shape)
+    channels[:, 700:900] = channels[:, 700:701]
+    corners = np.array([[200.0, 300, 0], [-200, 300, 0], [-200, -300, 0], [200, -300, 0]])
+    write_c3d(
+        tmp_path / "a.c3d",
+        {"LASI": np.full((N, 3), 500.0)},
+        kinds=[2],
+        channels=channels,
+        corners=[corners],
+        origins=[[0.0, 0.0, -40.0]],
+        per_frame=10,
+    )
+    found = read_c3d(tmp_path / "a.c3d")
+    (said,) = warnings_of(found.notes)
+    assert said.text.startswith("plate 1 repeats one and the same row while somebody stands on it, from 0.70 to 0.90 s")
+    unknown = np.isnan(found.plates[0].force[:, 2])
+    assert unknown[71:90].all() and not unknown[:55].any() and not unknown[105:].any()
+
+
+@pytest.mark.parametrize(("second", "shared"), [([7, 8, 9, 10, 11, 12], False), ([7, 8, 3, 4, 11, 12], True)])
+def test_plates_that_share_channels_are_named(second: list[int], shared: bool) -> None:
+    listed = {"CHANNEL": {"value": np.array([[1, 2, 3, 4, 5, 6], second]).T}, "TYPE": {"value": [2, 2]}}
+    said = shared_channels(Parameters({"FORCE_PLATFORM": listed}), ["plate 1", "plate 2"])
+    assert [each.text.startswith("plate 2 lists the analog channels of plate 1 (numbers 3, 4 ") for each in said] == (
+        [True] if shared else []
+    )
