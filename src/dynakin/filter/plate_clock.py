@@ -177,10 +177,10 @@ def _even_time(time: Array, numbers: npt.NDArray[np.intp]) -> Array:
 def _led_across(wrench: Array, seen: Flags, most: int) -> tuple[Array, Flags]:
     """The wrench (T, 6) led across gaps of the markers (T,) of at most so many frames, and which (T,) those are:
     without the feet it is not known who stands on which plate. Frames that are seen without it are left as they are."""
-    known = np.isfinite(wrench).all(axis=1)
+    known: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
     led = np.zeros(len(seen), dtype=bool)
     for first, end in runs(~seen):
-        if 0 < first and end < len(seen) and end - first <= most and known[first - 1] and known[end]:
+        if first > 0 and end < len(seen) and end - first <= most and known[first - 1] and known[end]:
             led[first:end] = True
     if not led.any():
         return wrench, led

@@ -97,7 +97,7 @@ def _spectrum(recording: Recording) -> tuple[Array, Array]:
     """Frequencies (F,) Hz and amplitudes (F,) m, median over the markers: the noise a frame of a white one. By windows
     within the stretches without blank frames and without rows that the file lacks: noise does not show across them."""
     markers, rate = on_grid(frame_numbers(recording.time), recording.markers), recording.rate
-    stretches = runs(np.isfinite(markers).any(axis=(1, 2)))
+    stretches = runs(np.asarray(np.isfinite(markers).any(axis=(1, 2))))
     longest = max((end - first for first, end in stretches), default=0)
     if longest < _FEWEST:
         return np.zeros(0), np.zeros(0)

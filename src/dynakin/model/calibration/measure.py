@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -127,22 +128,30 @@ class _Still:
     stands: bool
 
 
-def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
-    """The model filled with what the recording shows; errors as of ``Definition.calibrate``."""
+@contextmanager
+def told_of_the_static(recording: Recording, static: Recording | None) -> Iterator[None]:
+    """A refusal says, too, that the standing trial is of somebody else, where it looks so.
+
+    Raises:
+        DynakinError: as what is done in it does.
+    """
     try:
-        return _measure(asked)
+        yield
     except DynakinError as refusal:
-        static = asked.static
-        other = "" if static is None else another_person(asked.recording, static)
+        other = "" if static is None else another_person(recording, static)
         if static is None or not other:
             raise
-        raise type(refusal)(f"{refusal.message}. Of the standing trial {static.path or static.name}: {other}") from None
+        text = f"{refusal.message}. Of the standing trial {static.path or static.name}: {other}"
+        raise type(refusal)(text) from None
 
 
-def _measure(asked: Asked) -> tuple[ModelPlan, Measured]:
+def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
+    """The model filled with what the recording shows; errors as of ``Definition.calibrate``."""
     model, subject, table = asked.model, asked.subject, asked.table
     if model.sided and asked.side in ("right", "left"):
-        raise ModelError(f"side is {asked.side}, but model {model.name} has both legs; expected auto, or a planar model")
+        raise ModelError(
+            f"side is {asked.side}, but model {model.name} has both legs; expected auto, or a planar model"
+        )
     if asked.functional and not model.sided:
         raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
     messages: list[Message] = []

@@ -114,10 +114,6 @@ def _recording(data: Any, path: Path, options: ReadOptions, notes: list[Message]
         )
 
     time = np.arange(frames) / rate
-    header_rate = float(data["header"]["points"]["frame_rate"])
-    if header_rate > 0.0 and abs(header_rate / rate - 1.0) > 0.01:
-        text = f"The header says {header_rate:g} Hz, POINT:RATE {rate:g} Hz: the latter is used."
-        start_notes.append(note("recording", text))
     analog = np.asarray(data["data"]["analogs"], dtype=float)[0]  # (channels, samples)
     plates, plate_notes = read_plates(parameters, analog, time, markers, factor, options)
     events, event_notes = read_events(parameters, first / rate, time)

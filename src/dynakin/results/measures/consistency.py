@@ -282,6 +282,6 @@ def mismatch_in_words(names: list[str], rotation: np.ndarray, mismatch: np.ndarr
     unit = "rad/s" if rotation[worst] else "m/s"
     return (
         f"The estimated speeds are not the derivatives of the estimated coordinates for {len(wrong)} of {len(names)}: "
-        f"{shown} (worst: {names[worst]}, {mismatch[worst]:.2g} {unit} off where it moves at {moving[worst]:.2g} {unit}), "
-        f"so the speeds and accelerations of {'this' if len(wrong) == 1 else 'these'} are not to be relied on."
+        f"{shown} (worst: {names[worst]}, {mismatch[worst]:.2g} {unit} off where it moves at {moving[worst]:.2g} "
+        f"{unit}), so the speeds and accelerations of {'this' if len(wrong) == 1 else 'these'} are not to be relied on."
     )
