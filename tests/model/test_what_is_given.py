@@ -29,7 +29,7 @@ def calibrated(height_m: float = 1.75, **given: Any) -> CalibratedModel:
 
 @pytest.mark.parametrize("forward", ["-X", "+Z", "-Z"])
 def test_a_forward_that_feet_and_pelvis_contradict_is_refused(forward: str) -> None:
-    with pytest.raises(DynakinError, match="forward is given as .* but the person faces"):
+    with pytest.raises(DynakinError, match=r"forward is given as .* but the person faces"):
         calibrated(forward=forward)
 
 

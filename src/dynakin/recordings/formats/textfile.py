@@ -177,7 +177,8 @@ def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array,
     slope = float(centred @ time / (centred @ centred))  # s a frame, by least squares
     if rounded_to is None or slope <= 0.0 or rounded_to <= _ROUGH * slope or (np.diff(time) < 0).any():
         return time, []
-    if rounded_to < _COARSE * slope and (np.diff(time) == 0).any():  # a row twice: rounding makes no two times equal
+    said = 1.0 / rate_in_header if rate_in_header and 0.8 < rate_in_header * slope < 1.2 else slope
+    if rounded_to < _COARSE * said and (np.diff(time) == 0).any():  # a row twice: rounding makes no two times equal
         return time, []
     for rate in (rate_in_header, float(np.rint(1.0 / slope)), 1.0 / slope):
         if rate is None or not rate > 0.0 or np.abs(np.diff(time) - 1.0 / rate).max() >= (1.0 - 1e-6) * rounded_to:
