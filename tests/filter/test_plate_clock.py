@@ -105,3 +105,19 @@ def test_who_lands_shows_no_few_milliseconds() -> None:
     known = np.flatnonzero(np.isfinite(wrench[:, 1]))
     wrench[known[-1], 1] = 2.5 * 70.0 * 9.81
     assert clock_delay(ready.calibrated, recording.time, markers, wrench) is None
+
+
+def test_short_gaps_hide_no_delay() -> None:
+    """Three frames without markers, blank or not in the file at all."""
+    ready, recording = prepared(), brought_into_step(simulate("fullbody", "gait", 7, 4.0).recording, -0.01)
+    whole = delay_of(recording, ready)
+    assert whole is not None
+    markers, wrench = recording_arrays(recording, ready.calibrated)
+    wrench = np.where(np.isfinite(ready.wrench).all(axis=1, keepdims=True), wrench, np.nan)
+    gap = np.isin(np.arange(recording.n_frames) % 60, [40, 41, 42])
+    blank = np.where(gap[:, None, None], np.nan, markers), np.where(gap[:, None], np.nan, wrench)
+    found = clock_delay(ready.calibrated, recording.time, *blank)
+    lacking = clock_delay(ready.calibrated, recording.time[~gap], markers[~gap], wrench[~gap])
+    assert found is not None and lacking is not None
+    assert found.delay_s == pytest.approx(whole.delay_s, abs=0.0005)
+    assert lacking == pytest.approx(found, abs=1e-6)

@@ -86,3 +86,18 @@ def test_real_recordings(data_dir: Path, name: str, cutoff_hz: float | None) -> 
     assert (found is None) == (cutoff_hz is None)
     if found is not None and cutoff_hz is not None:
         assert found.cutoff_hz == pytest.approx(cutoff_hz, rel=0.3)
+
+
+def test_rows_that_the_file_lacks_are_no_noise(gait: Recording) -> None:
+    found = low_passed(gait, 6.0)
+    kept = np.r_[0:150, 153 : gait.n_frames]
+    lacking = replace(found, time=found.time[kept], markers=found.markers[kept], plates=())
+    known = found_low_pass(lacking)
+    assert known is not None and known.cutoff_hz == pytest.approx(6.0, rel=0.27)
+
+
+def test_of_a_second_that_is_cut_by_blank_frames_the_longer_part_counts(gait: Recording) -> None:
+    found = low_passed(gait, 6.0).window(0.0, 1.31)
+    markers = found.markers.copy()
+    markers[60:63] = np.nan
+    assert found_low_pass(replace(found, markers=markers)) is not None

@@ -171,6 +171,13 @@ def test_rounded_times_are_put_back_on_their_grid(tmp_path: Path, rate: float, d
     assert any("Times are rounded" in note for note in map(str, recording.notes)) == rounded
 
 
+@pytest.mark.parametrize("twice", [2, 11])
+def test_a_row_that_stands_twice_is_no_rounding(tmp_path: Path, twice: int) -> None:
+    exact = np.insert(np.arange(N - 1) / 100.0, twice, twice / 100.0)
+    with pytest.raises(RecordingError, match="does not come after"):
+        read(put(tmp_path, "a.trc", trc_text(np.round(exact, 2), 100.0)))
+
+
 def test_a_lost_frame_is_no_rounding(tmp_path: Path) -> None:
     exact = np.delete(np.arange(N + 1) / 60.0, 11)
     recording = read(put(tmp_path, "a.trc", trc_text(np.round(exact, 2), 60.0)))

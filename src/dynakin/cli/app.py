@@ -16,7 +16,7 @@ import dynakin
 from dynakin.cli.batch import batch
 from dynakin.cli.check import check
 from dynakin.cli.compare import compare
-from dynakin.cli.console import print_error
+from dynakin.cli.console import lost_output, print_error
 from dynakin.cli.demo import demo
 from dynakin.cli.identify import identify
 from dynakin.cli.live import live
@@ -99,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = _STOPPED
     if code == _STOPPED:  # which typer may have made of a KeyboardInterrupt itself
         print_error("stopped")
-    return code if isinstance(code, int) else 0
+    return (code if isinstance(code, int) else 0) or int(lost_output())
 
 
 def _without_value(words: Sequence[str], command: Any) -> str | None:

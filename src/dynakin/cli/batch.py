@@ -40,7 +40,7 @@ def batch(
         from dynakin.report.text_tables import table2_text
         from dynakin.results.naming import plural
         from dynakin.studies.batch.dataset import check_presets, read_dataset
-        from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
+        from dynakin.studies.batch.process import TRIALS, Options, belongs_to, run_batch, write_batch
         from dynakin.studies.batch.subjects import identify_subjects, with_parameters
         from dynakin.studies.engine.journal import ROWS, Journal, open_folder
         from dynakin.studies.engine.pools import open_pool
@@ -52,7 +52,7 @@ def batch(
     options = Options(tuple(preset or found.presets), cutoff, not tables_only)
     subjects = sorted({session.subject for session in found.sessions})
     folder = open_folder(found.output, ("table2", "batch.", "trials.", *subjects))
-    journal = Journal(folder / ROWS, belongs_to(found, options, identify=identify))
+    journal = Journal(folder / ROWS, belongs_to(found, options, identify=identify), None if identify else TRIALS)
     identified = {}
     with open_pool(backend, jobs, scheduler) as pool:
         if identify:

@@ -9,7 +9,7 @@ import typer
 
 from dynakin.cli.console import out
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
-from dynakin.errors import DynakinError
+from dynakin.errors import DynakinError, OutputError
 from dynakin.progress import stage
 
 
@@ -54,6 +54,11 @@ def run(
         raise typer.BadParameter("--sensitivity is a figure for papers, expected --figures FOLDER with it")
     if figures is not None:
         check_folder_writable(figures)
+        if config.output.resolve() in (figures.resolve(), *figures.resolve().parents):
+            raise OutputError(
+                f"--figures {figures}: lies in the output folder {config.output}, which is replaced as a whole by the "
+                "next run; name a folder beside it"
+            )
     grid = None
     if sensitivity is not None:
         from dynakin.report.paper_figures.sensitivity import read_sensitivity  # Matplotlib: only who draws waits

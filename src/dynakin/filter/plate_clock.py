@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.arrays import runs, wrench_about
@@ -24,10 +25,11 @@ from dynakin.model.calibration.inverse_kinematics import FEWEST_MARKERS, inverse
 from dynakin.model.calibration.pose_start import bare
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.recordings.resampling import low_pass
-from dynakin.recordings.times import rate_of
+from dynakin.recordings.times import frame_numbers, on_grid, rate_of
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 CUTOFF_HZ = 6.0
 """Low-pass of motion and plates, of one delay: none."""
@@ -48,6 +50,9 @@ WIDE_S = 0.03
 PASSES = 3
 SHORTEST_S, END_S, LONGEST_S = 0.4, 0.1, 5.0
 """Stretches that are judged; their ends are not; so much is, where loads change most."""
+BRIDGED_S = 0.1
+"""Longest gap of the markers that motion and plates are led across: little of a movement below `CUTOFF_HZ` is lost. Its
+frames themselves do not count."""
 LOADED, MOST_LOAD = 0.3, 2.0
 """Of the weight: mean of a stretch at least, and of the recording at most, because flesh follows a landing later than
 bones do: a drop jump fits its plates worse by the 5 to 8 ms that its calmer parts ask for."""
@@ -83,12 +88,15 @@ def clock_delay(initial: CalibratedModel, time: Array, markers: Array, wrench: A
         return None
     if (wrench[:, 1] > MOST_LOAD * weight).any():
         return None
+    numbers = frame_numbers(time)  # rows that the file lacks are frames without markers
+    time, markers, wrench = _even_time(time, numbers), on_grid(numbers, markers), on_grid(numbers, wrench)
     seen = np.isfinite(markers).all(axis=2).sum(axis=1) >= FEWEST_MARKERS
-    stretches = _stretches(np.where(seen[:, None], wrench, np.nan), rate, LOADED * weight)
+    wrench, led = _led_across(wrench, seen, round(BRIDGED_S * rate))
+    stretches = _stretches(np.where((seen | led)[:, None], wrench, np.nan), rate, LOADED * weight)
     if not stretches:
         return None
     body = _Body(initial)
-    judged = [(part, body.needed(markers[part], rate / part.step)) for part in stretches]
+    judged = [(part, body.needed(markers[part], seen[part], rate / part.step)) for part in stretches]
     noise = weight * np.repeat([FORCE, MOMENT_M], 3)
     prior_sd = np.concatenate([[WIDE_S], body.inertia_sd, OFFSET * noise])
     delay, variance = 0.0, np.inf
@@ -105,10 +113,11 @@ def clock_delay(initial: CalibratedModel, time: Array, markers: Array, wrench: A
 
 class _Needed(NamedTuple):
     """What a stretch of the motion needs: wrench (T, 6) about the ground's origin, and its derivatives (T, 6, I) by
-    inertia; both low-passed; and the frames whose ends are left out."""
+    inertia; both low-passed; and the frames (T,) that count."""
 
     wrench: Array
     by_inertia: Array
+    seen: Flags
     rate: float
 
     def equations(self, plates: Array, noise: Array) -> tuple[Array, Array]:
@@ -118,7 +127,8 @@ class _Needed(NamedTuple):
         load = measured.mean(axis=0)
         centre = np.array([load[5], 0.0, -load[3]]) / load[1]
         end = round(END_S * self.rate)
-        inner = slice(end, len(plates) - end)
+        inner = self.seen.copy()
+        inner[:end] = inner[len(plates) - end :] = False
         differs = wrench_about(measured - self.wrench, centre)[inner] / noise
         later = wrench_about(-np.gradient(measured, 1.0 / self.rate, axis=0), centre)[inner] / noise
         bodies = wrench_about(self.by_inertia.swapaxes(1, 2), centre)[inner] / noise  # (N, I, 6)
@@ -143,9 +153,11 @@ class _Body:
         known = [_unsure(np.array(segment.inertia)) for segment in segments if segment.inertia[0] > 0.0]
         self.inertia_sd = np.concatenate(known)
 
-    def needed(self, markers: Array, rate: float) -> _Needed:
-        """Of a stretch of markers (T, M, 3), each frame of which shows enough."""
-        q = low_pass(inverse_kinematics(self._initial, markers), rate, CUTOFF_HZ)
+    def needed(self, markers: Array, seen: Flags, rate: float) -> _Needed:
+        """Of a stretch of markers (T, M, 3), which show enough in most of its frames (T,)."""
+        posed = inverse_kinematics(self._initial, markers[seen])
+        q = CubicSpline(np.flatnonzero(seen), posed)(np.arange(len(markers))) if not seen.all() else posed
+        q = low_pass(q, rate, CUTOFF_HZ)
         qd = np.gradient(q, 1.0 / rate, axis=0)
         motion = np.hstack([q, qd, np.gradient(qd, 1.0 / rate, axis=0)])
         wrench, by_inertia = np.empty((len(q), 6)), np.empty((len(q), 6, len(self._inertia)))
@@ -154,7 +166,27 @@ class _Body:
             x[: len(moving)] = moving
             wrench[k] = _core.wrench(self._model, x)
             by_inertia[k] = _core.wrench_jacobian(self._model, x)[:, self._inertia]
-        return _Needed(wrench, by_inertia, rate)
+        return _Needed(wrench, by_inertia, seen, rate)
+
+
+def _even_time(time: Array, numbers: npt.NDArray[np.intp]) -> Array:
+    """Times (N,) s of all frames of the grid on which those (T,) of these numbers lie."""
+    return np.interp(np.arange(int(numbers[-1]) + 1), numbers, time)
+
+
+def _led_across(wrench: Array, seen: Flags, most: int) -> tuple[Array, Flags]:
+    """The wrench (T, 6) led across gaps of the markers (T,) of at most so many frames, and which (T,) those are:
+    without the feet it is not known who stands on which plate. Frames that are seen without it are left as they are."""
+    known: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
+    led = np.zeros(len(seen), dtype=bool)
+    for first, end in runs(~seen):
+        if first > 0 and end < len(seen) and end - first <= most and known[first - 1] and known[end]:
+            led[first:end] = True
+    if not led.any():
+        return wrench, led
+    found = wrench.copy()
+    found[led] = CubicSpline(np.flatnonzero(known), wrench[known])(np.flatnonzero(led))
+    return found, led
 
 
 def _unsure(inertia: Array) -> Array:

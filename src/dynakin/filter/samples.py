@@ -26,11 +26,22 @@ class Sample:
         markers: name in the recording -> (3,) m; a marker that is missing is left out or NaN.
         plates: plate -> (6,) wrench [N, N m], ground on person, about the laboratory origin. One that is left out, or
             NaN, is not known, and then their sum is not; an empty plate has zeros.
+
+    Raises:
+        RecordingError: markers or plates are no dictionary.
     """
 
     time_s: float
     markers: Mapping[str, npt.ArrayLike]
     plates: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for what, given in (("markers", self.markers), ("plates", self.plates)):
+            if not isinstance(given, Mapping):
+                raise RecordingError(
+                    f"sample at {self.time_s} s: {what} are of type {type(given).__name__}, expected a dictionary by "
+                    "name, empty where there are none"
+                )
 
 
 def recording_arrays(recording: Recording, initial: CalibratedModel, *, gaps: bool = False) -> tuple[Array, Array]:

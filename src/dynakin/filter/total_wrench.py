@@ -56,6 +56,10 @@ UNJUDGED = (
     "plates carry the person."
 )
 CLOCK_HIDDEN = "Not all of the body is marked: this movement does not show whether plates and markers are in step."
+CLOCK_UNKNOWN = (
+    "Whether plates and markers are in step within some milliseconds is not known here: it takes half a second of a "
+    "movement in which the plates carry all of the person, never more than twice the weight, and no declared contact."
+)
 MANY = 0.2
 """Part of the frames from which it is said that they could not be checked; the ends of a recording never can."""
 _NEARLY_ALL = 0.8
@@ -125,6 +129,8 @@ def known_ground(
     """
     ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance)
     left = clock_delay(initial, recording.time, markers, known) if ground.loads is not None else None
+    if left is None and ground.loads is not None and ground.usable and not ground.behind_s and not initial.unseen_kg:
+        ground = replace(ground, notes=(*ground.notes, note("sum of the plates", CLOCK_UNKNOWN)))
     if left is None or not left.worth_it:  # the coarse search's deviation gives way to the finer one's
         return (replace(ground, clock_sd_s=left.sd_s) if left is not None and ground.behind_s else ground), known
     delay = Delay(ground.behind_s + left.delay_s, left.sd_s)

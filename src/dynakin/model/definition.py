@@ -20,7 +20,7 @@ from dynakin.model.calibration.calibrated import (
     starting_state,
 )
 from dynakin.model.calibration.in_space import started
-from dynakin.model.calibration.measure import Asked, measure
+from dynakin.model.calibration.measure import Asked, measure, told_of_the_static
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
 from dynakin.model.markers.recognise import choose_marker_set, lacking, recognise
@@ -201,10 +201,11 @@ class ModelDefinition:
             self.model, self.path, self.subject, self.table, self.marker_set, self.functional,
             recording, static, side, vertical, forward, ground,
         )  # fmt: skip
-        plan, rest = measure(asked)
+        with told_of_the_static(recording, static):
+            plan, rest = measure(asked)
+            begun = started(plan, rest.trial, rest.unplaced, rest.still) if plan.model.sided else None
         messages, speeds, held = list(rest.messages), dict[str, float](), rest.held
-        if plan.model.sided:
-            begun = started(plan, rest.trial, rest.unplaced, rest.still)
+        if begun is not None:
             plan, speeds = begun.plan, begun.speeds
             messages += begun.messages
             held = held | begun.held

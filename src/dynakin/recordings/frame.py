@@ -12,6 +12,7 @@ from dynakin.arrays import cross, wrench_about
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.orientation import (
+    against_forward,
     against_vertical,
     axis_vector,
     find_forward,
@@ -154,6 +155,14 @@ def find_ground_frame(
         if flat is None:
             raise ConfigError(f"found forward {forward!r}, expected three numbers with a part across vertical {axis}")
         ahead = flat
+        shown, sure = against_forward(recording, up, ahead, pairs)
+        if sure:
+            raise RecordingError(
+                f"{recording.path or recording.name}: forward is given as {forward}, but the person faces {shown}; "
+                "expected the direction in which the person faces, or auto"
+            )
+        if shown:
+            how.append(f"Forward: the person faces {shown}; not followed.")
         how.append(f"Forward ({', '.join(f'{value:.3f}' for value in ahead + 0.0)}) in the laboratory: given.")
     rotation = np.vstack([ahead, up, np.cross(ahead, up)])
     origin = np.zeros(3) if origin_L is None else np.asarray(origin_L, dtype=float)

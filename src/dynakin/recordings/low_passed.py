@@ -13,7 +13,9 @@ from itertools import pairwise, product
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import runs
 from dynakin.recordings.recording import Recording
+from dynakin.recordings.times import frame_numbers, on_grid
 
 Array = npt.NDArray[np.float64]
 
@@ -78,7 +80,7 @@ class LowPass:
 def found_low_pass(recording: Recording) -> LowPass | None:
     """The low-pass that the markers of a movement went through; None of raw ones, of one who stands, and where too few
     frames or too coarse numbers do not show it."""
-    if recording.n_frames < _FEWEST or not recording.rate >= 4.0 * _CUTOFFS_HZ[0]:
+    if not recording.n_frames or not recording.rate >= 4.0 * _CUTOFFS_HZ[0]:
         return None
     f, amplitude = _spectrum(recording)
     half = 0.5 * recording.rate
@@ -92,10 +94,15 @@ def found_low_pass(recording: Recording) -> LowPass | None:
 
 
 def _spectrum(recording: Recording) -> tuple[Array, Array]:
-    """Frequencies (F,) Hz and amplitudes (F,) m, median over the markers: the noise a frame of a white one."""
-    markers, rate = recording.markers, recording.rate
-    size = min(len(markers), max(_FEWEST, round(_WINDOW_S * rate)))
-    starts = range(0, len(markers) - size + 1, max(size // 2, 1))
+    """Frequencies (F,) Hz and amplitudes (F,) m, median over the markers: the noise a frame of a white one. By windows
+    within the stretches without blank frames and without rows that the file lacks: noise does not show across them."""
+    markers, rate = on_grid(frame_numbers(recording.time), recording.markers), recording.rate
+    stretches = runs(np.asarray(np.isfinite(markers).any(axis=(1, 2))))
+    longest = max((end - first for first, end in stretches), default=0)
+    if longest < _FEWEST:
+        return np.zeros(0), np.zeros(0)
+    size = min(longest, max(_FEWEST, round(_WINDOW_S * rate)))
+    starts = [k for first, end in stretches for k in range(first, end - size + 1, max(size // 2, 1))]
     at = np.linspace(-1.0, 1.0, size)
     basis = np.linalg.qr(np.vander(at, 4))[0]
     # Blackman-Harris: side lobes of -92 dB, as the noise lies that far below the movement

@@ -32,6 +32,41 @@ def find_forward(recording: Recording, up: Array, pairs: FacingPairs) -> tuple[A
     Raises:
         RecordingError: no foot or pelvis pair, no pair of sides, and the person does not walk.
     """
+    known, way = _forward_witnesses(recording, up, pairs)
+    if not known:
+        raise RecordingError(
+            f"{recording.path or recording.name}: facing direction not found "
+            "(no heel and toe, no pelvis markers, no right and left of one place, the "
+            f"person walks {way:.2g} m only), expected it to be given"
+        )
+    why, forward = known[0]
+    written = ", ".join(f"{value:.3f}" for value in forward + 0.0)
+    how = [f"Forward ({written}) in the laboratory: {why}."]
+    for other, direction in known[1:]:
+        angle = _apart_deg(forward, direction)
+        verdict = "agrees" if angle <= _MAX_DISAGREEMENT_DEG else "DISAGREES, check the marker names"
+        how.append(f"Forward: {other} {verdict} ({angle:.0f} deg).")
+    return forward, how
+
+
+def against_forward(recording: Recording, up: Array, given: Array, pairs: FacingPairs) -> tuple[str, bool]:
+    """How the body contradicts a forward direction that is given, "" where it does not; and whether feet and pelvis, or
+    the like, agree on that. Where the person walks is no witness: one may walk backwards."""
+    known = [(why, one) for why, one in _forward_witnesses(recording, up, pairs)[0] if not why.startswith(_WALKING)]
+    if not known or any(_apart_deg(given, direction) <= _CONTRADICTS_DEG for _, direction in known):
+        return "", False
+    why, found = known[0]
+    written = ", ".join(f"{value:.2f}" for value in found + 0.0)
+    agree = len(known) > 1 and all(_apart_deg(found, other) <= _MAX_DISAGREEMENT_DEG for _, other in known[1:])
+    return f"({written}) {why}, {_apart_deg(given, found):.0f} deg off", agree
+
+
+def _apart_deg(one: Array, other: Array) -> float:
+    return float(np.degrees(np.arccos(np.clip(one @ other, -1, 1))))
+
+
+def _forward_witnesses(recording: Recording, up: Array, pairs: FacingPairs) -> tuple[list[tuple[str, Array]], float]:
+    """What shows where the person faces, the surest first, and how far (m) the person walks."""
     frames = _window(recording)
     feet, n_feet = _mean_direction(recording, pairs.heel_toe, up, frames)
     pelvis, n_sides = _mean_direction(recording, pairs.pelvis, up, frames)
@@ -43,23 +78,9 @@ def find_forward(recording: Recording, up: Array, pairs: FacingPairs) -> tuple[A
         ("square to the line from right to left", None if leftward is None else np.cross(leftward, up)),
         ("from heel to toe (one foot only)", feet if n_feet == 1 else None),
         ("from the back of the pelvis to its front (one side only)", pelvis if n_sides == 1 else None),
-        (f"the walking direction ({way:.2g} m)", walk),
+        (f"{_WALKING} ({way:.2g} m)", walk),
     ]
-    known = [(why, direction) for why, direction in found if direction is not None]
-    if not known:
-        raise RecordingError(
-            f"{recording.path or recording.name}: facing direction not found "
-            "(no heel and toe, no pelvis markers, no right and left of one place, the "
-            f"person walks {way:.2g} m only), expected it to be given"
-        )
-    why, forward = known[0]
-    written = ", ".join(f"{value:.3f}" for value in forward + 0.0)
-    how = [f"Forward ({written}) in the laboratory: {why}."]
-    for other, direction in known[1:]:
-        angle = float(np.degrees(np.arccos(np.clip(forward @ direction, -1, 1))))
-        verdict = "agrees" if angle <= _MAX_DISAGREEMENT_DEG else "DISAGREES, check the marker names"
-        how.append(f"Forward: {other} {verdict} ({angle:.0f} deg).")
-    return forward, how
+    return [(why, direction) for why, direction in found if direction is not None], way
 
 
 def horizontal(direction: Array, up: Array) -> Array | None:
@@ -91,6 +112,11 @@ def _mean_direction(
     return (horizontal(np.sum(directions, axis=0), up) if directions else None), len(directions)
 
 
+def walks(recording: Recording, up: Array) -> bool:
+    """Whether the person goes somewhere, and so is upright."""
+    return _walking(recording, up)[0] is not None
+
+
 def _walking(recording: Recording, up: Array) -> tuple[Array | None, float]:
     """Horizontal direction and length (m) of the way of the markers that are seen at both ends."""
     size = max(1, min(round(0.1 * recording.rate), recording.n_frames // 4)) if recording.n_frames > 1 else 1
@@ -107,6 +133,10 @@ def _walking(recording: Recording, up: Array) -> tuple[Array | None, float]:
     return (way / length if length >= WALKS_M else None), length
 
 
+_WALKING = "the walking direction"
+_CONTRADICTS_DEG = 60.0
+"""Between a forward direction that is given and what each part of the body shows: an axis of the laboratory is given
+for who faces it within 45 deg."""
 AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
 _MIN_SHARE = 0.8  # how much of a direction an axis must hold to be taken for it (37 deg)
 

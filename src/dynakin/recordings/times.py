@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+_PAUSE_S = 1.0  # nothing is led across it
 _FEW = 9  # frames, over which the scatter of time stamps is averaged
 
 
@@ -26,6 +27,26 @@ def rate_of(time: Array) -> float:
         return float((len(time) - 1) / (time[-1] - time[0]))
     mean_step, off = even_grid(time)
     return 1.0 / mean_step if scatters(off, mean_step) else 1.0 / step
+
+
+def frame_numbers(time: Array) -> npt.NDArray[np.intp]:
+    """Number (T,) of each frame on the even grid that times (T,) s lie on, from 0: rows that a file lacks are left out
+    of it, a pause longer than `_PAUSE_S` as that many."""
+    rate = rate_of(time)
+    if len(time) < 3 or not np.isfinite(rate):
+        return np.arange(len(time))
+    step, off = even_grid(time)
+    if scatters(off, step):
+        return np.arange(len(time))
+    steps = np.clip(np.rint(np.diff(time) * rate), 1.0, max(_PAUSE_S * rate, 1.0)).astype(int)
+    return np.concatenate([[0], np.cumsum(steps)])
+
+
+def on_grid(numbers: npt.NDArray[np.intp], values: Array) -> Array:
+    """Values (T, ...) of frames of these numbers with those that are lacking, NaN: (N, ...)."""
+    found = np.full((int(numbers[-1]) + 1, *values.shape[1:]), np.nan)
+    found[numbers] = values
+    return found
 
 
 def even_grid(time: Array) -> tuple[float, Array]:

@@ -229,6 +229,35 @@ def find_height(
     return height, [note("height", text)]
 
 
+TOO_SMALL, TOO_LARGE = 0.15, 0.2
+"""Parts of the height by markers by which one that is given may be less, or more: a shoulder shows it to some per cent,
+less high of who stands with bent legs."""
+
+
+def doubtful_height(subject: Subject, trial: Trial, stands: bool) -> list[Message]:
+    """A warning where a height that is given is none of who wears the markers.
+
+    Args:
+        stands: the person stands or walks in the trial: else the markers show only what the height is at least.
+    """
+    given, marker_set = subject.height_m, trial.match.marker_set
+    if given is None or marker_set.height_fraction is None:
+        return []
+    tops = [path for key, path in trial.paths.items() if key[0] == marker_set.height_marker]
+    tops = [path for path in tops if np.isfinite(path).all(axis=1).any()]
+    over = _over_the_foot(trial, tops) if tops else np.empty(0)
+    if not len(over):
+        return []
+    shown = _over_lowest(trial, tops, over)[0] / marker_set.height_fraction
+    if given > (1.0 - TOO_SMALL) * shown and not (stands and given > (1.0 + TOO_LARGE) * shown):
+        return []
+    text = (
+        f"the height is given as {given:.2f} m, but the markers show about {shown:.2f} m ({marker_set.height_marker} "
+        "over the feet): lengths and inertia that no marker shows follow the height. Correct --height."
+    )
+    return [warning("height", text)]
+
+
 def _by_proportions(trial: Trial, finder: LandmarkFinder) -> tuple[float, list[Message]]:
     """Height (m) from the highest landmark that needs no height itself, over a foot that stands."""
     feet = [name for names in trial.match.foot_markers.values() for name in names]

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.errors import ModelError
+from dynakin.errors import DynakinError, ModelError
 from dynakin.messages import Message, note, warning
-from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
+from dynakin.model.calibration.body import check_body_mass, doubtful_height, find_height, find_mass
 from dynakin.model.calibration.checks import (
     check_masses,
     check_standing,
@@ -39,7 +40,7 @@ from dynakin.model.table import BodyTable
 from dynakin.recordings.companions import another_person
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.landmarks import plain_name
-from dynakin.recordings.orientation import against_vertical
+from dynakin.recordings.orientation import against_vertical, axis_vector, walks
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.results.naming import listed, words
@@ -127,9 +128,30 @@ class _Still:
     stands: bool
 
 
+@contextmanager
+def told_of_the_static(recording: Recording, static: Recording | None) -> Iterator[None]:
+    """A refusal says, too, that the standing trial is of somebody else, where it looks so.
+
+    Raises:
+        DynakinError: as what is done in it does.
+    """
+    try:
+        yield
+    except DynakinError as refusal:
+        other = "" if static is None else another_person(recording, static)
+        if static is None or not other:
+            raise
+        text = f"{refusal.message}. Of the standing trial {static.path or static.name}: {other}"
+        raise type(refusal)(text) from None
+
+
 def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     """The model filled with what the recording shows; errors as of ``Definition.calibrate``."""
     model, subject, table = asked.model, asked.subject, asked.table
+    if model.sided and asked.side in ("right", "left"):
+        raise ModelError(
+            f"side is {asked.side}, but model {model.name} has both legs; expected auto, or a planar model"
+        )
     if asked.functional and not model.sided:
         raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
     messages: list[Message] = []
@@ -137,8 +159,16 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     marked = _marked(asked, trials, messages)
     model, finder, locks = marked.model, marked.finder, marked.locks
     still = _calibration_frames(asked, trials, marked, messages)
+    if asked.static is not None and not still.stands:
+        text = (
+            f"nobody stands still in {asked.static.name} (--static): lengths and marker places are measured on frames "
+            "in which the person moves. Give a trial of standing, or none."
+        )
+        messages.append(warning("standing", text))
     found, unmarked = _landmarks(asked, marked, still, messages)
     mass_kg, height_m = _mass_and_height(asked, marked, still, messages)
+    up = axis_vector(still.source.ground.vertical)
+    messages += doubtful_height(asked.subject, still.source, still.stands or walks(still.source.recording, up))
     messages += found.messages
     try:
         check_body_mass(subject, mass_kg, height_m)

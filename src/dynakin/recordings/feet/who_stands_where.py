@@ -112,7 +112,7 @@ class WhoStandsWhere:
         found = [
             note(
                 "plates",
-                f"{plate.name} is not measured or at the end of its range from {time[a]:.2f} to {time[b - 1]:.2f} s: "
+                f"{plate.name} is not measured or at the end of its range {_span(time, a, b)}: "
                 "what it carries is estimated there.",
             )
             for a, b in runs(~plate.known)
@@ -128,3 +128,10 @@ class WhoStandsWhere:
                 for a, b in runs(alone)
             ]
         return found
+
+
+def _span(time: Array, first: int, end: int) -> str:
+    """When frames [first, end) are."""
+    if end - first == 1:
+        return f"at {time[first]:.3f} s (one frame)"
+    return f"from {time[first]:.2f} to {time[end - 1]:.2f} s"

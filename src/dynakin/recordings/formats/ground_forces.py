@@ -13,7 +13,7 @@ from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, 
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.limits import check_wrench
-from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import LOADED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
 from dynakin.recordings.recording import Array, Plate, Recording
@@ -95,8 +95,7 @@ def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[Message]]:
         notes.append(note("recording", f"{name} has no free moment columns: 0 taken."))
     force, point = (_three(table, group.columns[quantity]) for quantity in ("force", "point"))
     free = _three(table, torque) if torque else np.zeros_like(force)
-    quiet = (force == 0.0).all(axis=1)
-    point[quiet & np.isnan(point).any(axis=1)] = 0.0  # a blank point of no force
+    point = _without_blanks(point, force)
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused
         moment = np.cross(point, force) + free
     lost = np.isnan(moment).any(axis=1) & ~np.isnan(np.hstack([point, force, free])).any(axis=1)
@@ -105,6 +104,23 @@ def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[Message]]:
     unloaded = np.linalg.norm(force, axis=1) < UNLOADED_N
     cop = np.where(unloaded[:, None], np.nan, point)
     return Plate(name, force, moment, cop, free), notes
+
+
+def _without_blanks(point: Array, force: Array) -> Array:
+    """Points of application (T, 3), where a plate that is hardly loaded has none: where it was pressed last or is next,
+    as programs blank the point of a force that is too small to show it; anywhere of no force."""
+    blank = np.isnan(point).any(axis=1)
+    known = np.flatnonzero(~blank & (np.linalg.norm(force, axis=1) > UNLOADED_N))
+    faint = np.flatnonzero(blank & (np.linalg.norm(force, axis=1) < LOADED_N))
+    found = point.copy()
+    if len(known):
+        after = np.clip(np.searchsorted(known, faint), 1, len(known) - 1) if len(known) > 1 else np.zeros_like(faint)
+        before = np.maximum(after - 1, 0)
+        nearer = np.where(faint - known[before] <= known[after] - faint, known[before], known[after])
+        found[faint] = point[nearer]
+    else:
+        found[faint[(force[faint] == 0.0).all(axis=1)]] = 0.0
+    return found
 
 
 def _three(table: Table, axes: dict[str, str]) -> Array:

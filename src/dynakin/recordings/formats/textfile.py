@@ -22,6 +22,7 @@ _CONTROL = re.compile(r"[\x00-\x1f\x7f]+")
 _MISSING = ("", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-", "-nan(ind)", "nan(ind)", "-1.#ind", "1.#qnan")
 _NO_NUMBER = "-*."  # and any number of these
 _ROUGH = 0.1  # part of a step from which rounding of times is undone: `resampling.UNEVEN` would refuse it
+_COARSE = 1.05  # the same from which rounding makes two times equal: 100 Hz to 0.01 s has none
 _ENOUGH = 10  # times that show a grid
 
 
@@ -175,6 +176,9 @@ def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array,
     centred = k - k.mean()
     slope = float(centred @ time / (centred @ centred))  # s a frame, by least squares
     if rounded_to is None or slope <= 0.0 or rounded_to <= _ROUGH * slope or (np.diff(time) < 0).any():
+        return time, []
+    said = 1.0 / rate_in_header if rate_in_header and 0.8 < rate_in_header * slope < 1.2 else slope
+    if rounded_to < _COARSE * said and (np.diff(time) == 0).any():  # a row twice: rounding makes no two times equal
         return time, []
     for rate in (rate_in_header, float(np.rint(1.0 / slope)), 1.0 / slope):
         if rate is None or not rate > 0.0 or np.abs(np.diff(time) - 1.0 / rate).max() >= (1.0 - 1e-6) * rounded_to:

@@ -68,7 +68,7 @@ def length_unit(word: str, raw: Array) -> tuple[float, Literal["mm", "m"], list[
         word = {1.0: "m", 1e-2: "cm", 1e-3: "mm"}[factor]
         notes.append(note("recording", f"{found}: {word} taken, as the markers span {span:.4g} of them."))
     if factor not in (1.0, 1e-3):
-        notes.append(note("recording", f"The file is in {word}; markers are written back in metres."))
+        notes.append(note("recording", f"The file's unit of length is {word}; markers are written back in metres."))
     return factor, ("mm" if factor == 1e-3 else "m"), notes
 
 

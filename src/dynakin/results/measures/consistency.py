@@ -249,6 +249,7 @@ def _verdict(judgements: Mapping[str, Judgement], noise: NoiseFrom) -> str:
 TOLERATED = 0.5
 # Nor one that no one would notice, as of a coordinate that is locked or hardly moves.
 UNNOTICED = 0.01  # rad/s or m/s
+_NAMED = 5
 
 
 def speed_mismatch(time: np.ndarray, coordinates: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -268,16 +269,19 @@ def speed_mismatch(time: np.ndarray, coordinates: np.ndarray, speeds: np.ndarray
 
 
 def mismatch_in_words(names: list[str], rotation: np.ndarray, mismatch: np.ndarray, moving: np.ndarray) -> str:
-    """One sentence about the worst coordinate, or an empty text where all speeds fit."""
+    """One sentence about the coordinates whose speeds do not fit, the worst first, or an empty text where all do."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(mismatch > 0.0, mismatch / moving, 0.0)
     wrong = np.flatnonzero((ratio > TOLERATED) & (mismatch > UNNOTICED))
     if not len(wrong):
         return ""
-    worst = int(wrong[np.argmax(mismatch[wrong])])
+    wrong = wrong[np.argsort(-mismatch[wrong])]
+    worst = int(wrong[0])
+    which = [names[k] for k in wrong]
+    shown = listed(which) if len(which) <= _NAMED else f"{', '.join(which[:_NAMED])} and {len(which) - _NAMED} more"
     unit = "rad/s" if rotation[worst] else "m/s"
     return (
-        f"The estimated speeds are not the derivatives of the estimated coordinates ({len(wrong)} of {len(names)}; "
-        f"worst: {names[worst]}, {mismatch[worst]:.2g} {unit} off where it moves at {moving[worst]:.2g} {unit}), "
-        "so the speeds and accelerations of this run are not to be relied on."
+        f"The estimated speeds are not the derivatives of the estimated coordinates for {len(wrong)} of {len(names)}: "
+        f"{shown} (worst: {names[worst]}, {mismatch[worst]:.2g} {unit} off where it moves at {moving[worst]:.2g} "
+        f"{unit}), so the speeds and accelerations of {'this' if len(wrong) == 1 else 'these'} are not to be relied on."
     )

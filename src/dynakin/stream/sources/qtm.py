@@ -193,6 +193,13 @@ def qtm_source(address: str, options: dict[str, str]) -> QtmSource:
     """
     frame = options.get("forces", "plate")
     port = options.get("port", str(_PORT))
-    if not address or set(options) - {"port", "forces"} or frame not in FRAMES or not port.isdecimal():
-        raise ConfigError(f"qtm:{address}: expected qtm:HOST[,port=22223][,forces=plate|lab], found {options}")
+    if (
+        not address
+        or set(options) - {"port", "forces"}
+        or frame not in FRAMES
+        or not (port.isdecimal() and 0 < int(port) < 65536)
+    ):
+        raise ConfigError(
+            f"qtm:{address}: expected qtm:HOST[,port=22223][,forces=plate|lab], ports 1 to 65535, found {options}"
+        )
     return QtmSource(address, port=int(port), frame=frame)

@@ -120,6 +120,10 @@ def work_on(options: Options, payload: Session) -> dict[str, Any]:
     }
 
 
+TRIALS = "trials"
+"""Of `belongs_to`: what each trial's row depends on alone, unless subjects are identified on several."""
+
+
 def belongs_to(dataset: Dataset, options: Options, *, identify: bool = False) -> dict[str, Any]:
     """All that the rows of a batch depend on, for its journal: settings, and the files with their sizes and times.
 
@@ -133,7 +137,7 @@ def belongs_to(dataset: Dataset, options: Options, *, identify: bool = False) ->
         "--cutoff-hz": options.cutoff_hz,
         "results of single trials": options.files,
         "--identify": identify,
-        "trials": {s.name: _but_output(s.content) | {"files": _stamps(s.content)} for s in dataset.sessions},
+        TRIALS: {s.name: _but_output(s.content) | {"files": _stamps(s.content)} for s in dataset.sessions},
     }
 
 

@@ -63,13 +63,16 @@ class Journal:
     Args:
         path: the file; made when the first row comes, in a folder that exists.
         belongs_to: plain data: everything on which the rows depend. It stands in the heading.
+        of_rows: a key of it under which stands, by the rows' keys, what one row alone depends on: that of rows which
+            are not there (failed, or never begun) may change.
 
     Raises:
         OutputError: the file cannot be read, is none of ours, or belongs to something else; what changed is named.
     """
 
-    def __init__(self, path: Path, belongs_to: Any) -> None:
+    def __init__(self, path: Path, belongs_to: Any, of_rows: str | None = None) -> None:
         self.path = path
+        self._of_rows = of_rows
         self._heading = {"dynakin_journal": VERSION, "belongs_to": json.loads(json.dumps(belongs_to))}
         self.rows = self._read()
 
@@ -86,11 +89,6 @@ class Journal:
             return {}
         if not isinstance(heading, dict) or heading.get("dynakin_journal") != VERSION:
             raise OutputError(f"{self.path}: belongs to another version of dynakin; name another folder, or remove it")
-        if changed := difference(heading.get("belongs_to"), self._heading["belongs_to"]):
-            raise OutputError(
-                f"{self.path}: belongs to other settings, recordings or another version ({changed}); name another "
-                "folder, or remove it, and all is worked out again"
-            )
         found: dict[str, Row] = {}
         for number, line in enumerate(whole[1:], start=2):
             try:
@@ -101,10 +99,30 @@ class Journal:
                     f"{self.path}, line {number}: is damaged, expected a row of JSON; delete that line, and what it "
                     "held is worked out again"
                 ) from None
+        before, now = heading.get("belongs_to"), self._heading["belongs_to"]
+        if changed := difference(self._of(before, found), self._of(now, found)):
+            raise OutputError(
+                f"{self.path}: belongs to other settings, recordings or another version ({changed}); name another "
+                "folder, or remove it, and all is worked out again"
+            )
+        if digest(before) != digest(now):
+            fresh = self.path.with_suffix(".new")
+            fresh.write_bytes(b"".join(line + b"\n" for line in (json.dumps(self._heading).encode(), *whole[1:])))
+            fresh.replace(self.path)
+            return found
         kept = sum(len(line) + 1 for line in whole)
         with self.path.open("r+b") as file:
             file.truncate(kept)
         return found
+
+    def _of(self, belongs_to: Any, rows: dict[str, Row]) -> Any:
+        """What these rows depend on."""
+        if self._of_rows is None or not isinstance(belongs_to, dict):
+            return belongs_to
+        each = belongs_to.get(self._of_rows)
+        if not isinstance(each, dict):
+            return belongs_to
+        return {**belongs_to, self._of_rows: {key: value for key, value in each.items() if key in rows}}
 
     def add(self, key: str, row: Row) -> None:
         """Append one row; it is on its way to the disk when this returns.
