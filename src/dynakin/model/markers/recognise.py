@@ -362,7 +362,8 @@ def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[Marke
     when = ""
     if swap.span_s is not None:
         when = f" from {swap.span_s[0]:.2f} to {swap.span_s[1]:.2f} s"
-    looks = f"{swap.what} look swapped{when} ({swap.evidence})"
+    who = swap.what if swap.what.startswith("all ") else f"markers {swap.what}"  # no name begins a sentence
+    looks = f"{who} look swapped{when} ({swap.evidence})"
     later = swap.span_s is not None and swap.span_s[0] > start_s + _START_S
     if swap.share < _SHORT or (later and swap.share < _HALF):
         return match, warning(
@@ -399,7 +400,7 @@ def _misplaced(
             return wrong
         k = int(np.argmax(n + far.sum(axis=1) / (1.0 + far.sum())))
         j = int(np.argmax(np.where(beyond[k], far[k], 0.0)))
-        wrong[k] = distance_words(
+        wrong[k] = "markers " + distance_words(
             match.names[keys[k]], match.names[keys[j]], float(found.distance[order[k], order[j]]),
             float(expected.distance[k, j]) * height_m,
         )  # fmt: skip
