@@ -205,7 +205,7 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
     if asked is not None:
         found = checked(recording, match_markers(asked, recording.marker_names, recording.seen, where))
         _refuse_wrong_set(found, where)
-        return found
+        return replace(found, messages=(*found.messages, *half_marked_words(found.match)))
     ranked = fits(recording.seen_names)
     try:
         usable = _usable(ranked, where)
@@ -230,8 +230,22 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
     messages = [note("marker set", choice), *best.messages]
     if doubtful:
         messages.insert(1, _guessed_words(recording, len(doubtful), f" ({_places(doubtful)})"))
+    messages += half_marked_words(best.match)
     match = replace(best.match, guessed=tuple(guess.recorded for guess in doubtful))
     return Recognised(match, tuple(messages), best.wrong_n)
+
+
+def half_marked_words(match: MarkerMatch) -> list[Message]:
+    """A warning of each foot of which a single marker is left while the other has several."""
+    return [
+        warning(
+            "labels",
+            f"the {side} foot is seen by {lone} alone, the other by {lost} as well: what stands under it is not known "
+            "by its markers, and the angles of its ankle are hardly. Look in the file whether its other markers are "
+            "there under another name, or empty.",
+        )
+        for side, (lone, lost) in match.half_marked.items()
+    ]
 
 
 def _enlarged(recording: Recording, found: Recognised) -> tuple[Recognised, list[Guess]]:
