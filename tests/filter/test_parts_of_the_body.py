@@ -127,6 +127,17 @@ def test_with_one_leg_its_moments_remain_and_the_other_ones_are_absent(walk: Sim
     assert "knee_angle" not in symmetry["coordinates"] and "arm_flex" not in symmetry["coordinates"]
 
 
+def test_a_foot_of_a_heel_alone_shows_nothing_of_its_load(walk: SimulatedTrial) -> None:
+    """The other leg stays measured, no plate is to blame, and it is said which markers are missed."""
+    gone = ("r_toe", "r_5meta")
+    estimate = estimated(without(walk.recording, lambda name: name in gone))
+    said = " ".join(map(str, estimate.messages))
+    assert "the right foot is seen by r_calc alone, the other by" in said and "where no foot stands" not in said
+    codes, names = moment_sources(estimate.data), estimate.coordinate_names
+    assert (codes[:, names.index("ankle_angle_r")] == ABSENT).all()
+    assert (codes[50:-50, names.index("ankle_angle_l")] == MEASURED).mean() > 0.9  # it walks there
+
+
 def arm(name: str) -> bool:
     return any(word in name for word in ("humerus", "elbow", "forearm", "wrist"))
 

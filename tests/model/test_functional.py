@@ -182,7 +182,7 @@ def test_trials_of_other_people_are_refused() -> None:
 
 def test_real_hip_and_knee(data_dir: Path) -> None:
     """One person, clusters of three: the hip lies within 25 mm of Harrington's regression; in `right_hip` the labels of
-    the epicondyles change places at half time, which is noticed."""
+    the epicondyles change places at half time, which the reader puts right (as the standing trial has them)."""
     standing, hip, knee = (
         read(data_dir / f"functional/{name}.c3d") for name in ("anat_pose_ECH", "right_hip", "right_knee")
     )
@@ -195,7 +195,7 @@ def test_real_hip_and_knee(data_dir: Path) -> None:
     pelvis, thigh = ("RASIS", "LASIS", "RPSIS", "LPSIS"), ("RTHI1", "RTHI2", "RTHI3")
     found = joint_centre(JointMotion.between(rigid_motion(*motion(hip, pelvis)), rigid_motion(*motion(hip, thigh))))
     assert 5.0 < 1e3 * found.residual_m < 12.0 and 6.0 < 1e3 * found.sd_m < 20.0
-    assert np.percentile(rigid_motion(*motion(hip, (*thigh, "RLFE"))).misfit_m, 90) > 0.025
+    assert np.percentile(rigid_motion(*motion(hip, (*thigh, "RLFE"))).misfit_m, 90) < 0.010
     shank = ("RLEG1", "RLEG2", "RLEG3")
     line = joint_axis(JointMotion.between(rigid_motion(*motion(knee, thigh)), rigid_motion(*motion(knee, shank))))
     worn = rigid_motion(*motion(knee, thigh)).rotations[::20].transpose(0, 2, 1)

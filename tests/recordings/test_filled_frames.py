@@ -86,3 +86,34 @@ def test_a_foot_on_a_moving_belt_is_no_line(noise_m: float) -> None:
     path = np.stack([np.cumsum(step, axis=0), 0.1 + np.where(stands, 0.0, 0.05) * np.ones((1, 4)), 0.1 + 0.0 * step], 2)
     found, notes = cleaned(time, np.round(path + rng.normal(0.0, noise_m, path.shape), 8))
     assert np.isfinite(found).all() and not notes
+
+
+@pytest.mark.parametrize("frames", [2, 6, 15])
+@pytest.mark.parametrize("noise_m", [0.0, 1e-4])
+def test_a_gap_that_was_filled_by_the_last_place_is_one(frames: int, noise_m: float) -> None:
+    time, markers = moving(noise_m=noise_m)
+    span = slice(81, 81 + frames)
+    markers[span, 1] = markers[80, 1]
+    found, notes = cleaned(time, markers)
+    assert np.isnan(found[span, 1]).all()
+    assert np.isfinite(np.delete(found, 1, axis=1)).all() and np.isfinite(found[:81, 1]).all()
+    assert any("filled by the last place before them, to the last digit: b, first at 0.810 s" in str(n) for n in notes)
+
+
+def test_a_marker_that_is_held_to_the_end_while_the_person_goes_on_is_missing() -> None:
+    time, markers = moving()
+    markers[121:, 1] = markers[120, 1]
+    found, _ = cleaned(time, markers)
+    assert np.isnan(found[121:, 1]).all() and np.isfinite(found[:121]).all()
+
+
+@pytest.mark.parametrize("digits", [3, 4, 9])
+def test_a_foot_that_rests_in_a_file_of_few_digits_is_measured(digits: int) -> None:
+    """It stands for 0.6 s of each step, to the last digit, while the others go on, and starts as feet do."""
+    time, markers = moving(400, 0.0)
+    phase = np.mod(time, 1.0)
+    swing = np.clip((phase - 0.6) / 0.4, 0.0, 1.0)
+    gone = np.floor(time) + 10 * swing**3 - 15 * swing**4 + 6 * swing**5
+    markers[:, 1] = np.stack([0.1 + 0.0 * time, 0.05 + 0.1 * np.sin(np.pi * swing) ** 2, 1.2 * gone], axis=1)
+    found, notes = cleaned(time, np.round(markers, digits))
+    assert np.isfinite(found).all() and not notes

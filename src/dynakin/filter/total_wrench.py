@@ -96,7 +96,8 @@ class Ground:
 
 
 def foot_markers(initial: CalibratedModel) -> dict[str, list[str]]:
-    """Foot -> the recording's names of the markers on its segment, and on those that hang on that (toes)."""
+    """Foot -> the recording's names of the markers on its segment, and on those that hang on that (toes); none of
+    `CalibratedModel.unmarked_feet`."""
     parents = {segment.name: segment.parent for segment in initial.spec.segments}
 
     def on(segment: str, foot: str) -> bool:
@@ -105,7 +106,10 @@ def foot_markers(initial: CalibratedModel) -> dict[str, list[str]]:
     if not initial.feet:
         return initial.foot_markers
     pairs = list(zip(initial.recorded_markers, initial.spec.markers, strict=True))
-    return {side: [name for name, m in pairs if on(m.segment, foot)] for side, foot in initial.feet.items()}
+    return {
+        side: [] if side in initial.unmarked_feet else [name for name, m in pairs if on(m.segment, foot)]
+        for side, foot in initial.feet.items()
+    }
 
 
 def known_ground(
@@ -232,8 +236,8 @@ def _loads_of_feet(
     hidden = np.isin(loads.feet, list(initial.unmarked_feet))
     loads = loads.without(np.tile(hidden, (recording.n_frames, 1)))
     text = (
-        f"No markers of the {' and the '.join(initial.unmarked_feet)} foot: what it carries is not known. Moments are "
-        "those of a leg whose own foot is on a plate, or in the air."
+        f"No markers of the {' and the '.join(initial.unmarked_feet)} foot that show where it stands: what it carries "
+        "is not known. Moments are those of a leg whose own foot is on a plate, or in the air."
     )
     return replace(loads, reasons=(*loads.reasons, note("plates", text)))
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
+
+_WORD, _PUNCTUATION = re.compile(r"[^\W\d_][a-z'’-]*"), ",.;:!?)"
 
 INERTIA_WORDS = {
     "mass": "mass",
@@ -27,8 +31,9 @@ def words(name: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """With a capital at the start, the rest as it is."""
-    return text[:1].upper() + text[1:]
+    """With a capital at the start, the rest as it is; names (``r_sh2``, ``r.ASIS``, ``walk.mot``) stay as they are."""
+    first = text.split(maxsplit=1)[0].rstrip(_PUNCTUATION) if text.strip() else ""
+    return text[:1].upper() + text[1:] if _WORD.fullmatch(first) else text
 
 
 def number(value: float | None, unit: str = "", digits: int = 3) -> str:

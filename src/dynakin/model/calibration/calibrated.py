@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -190,13 +191,15 @@ class CalibratedModel(StartingState):
 
     @property
     def unmarked_feet(self) -> dict[str, str]:
-        """Those of ``feet`` that no marker shows, nor what hangs on them."""
+        """Those of ``feet`` that no marker shows, nor what hangs on them; a single one is none where the other foot has
+        more: it shows neither how the foot lies nor where its load may be."""
         parents = {segment.name: segment.parent for segment in self.spec.segments}
-        marked = {marker.segment for marker in self.spec.markers}
+        shown = Counter(marker.segment for marker in self.spec.markers)
         for name in reversed(list(parents)):  # children stand after their parents
-            if name in marked and parents[name] in self.feet.values():
-                marked.add(parents[name])
-        return {side: name for side, name in self.feet.items() if name not in marked}
+            if shown[name] and parents[name] in self.feet.values():
+                shown[parents[name]] += shown[name]
+        least = 2 if max((shown[name] for name in self.feet.values()), default=0) > 1 else 1
+        return {side: name for side, name in self.feet.items() if shown[name] < least}
 
     def measured_plan(self) -> ModelPlan:
         """The plan.

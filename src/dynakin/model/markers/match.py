@@ -80,7 +80,29 @@ class MarkerMatch:
 
     @property
     def foot_markers(self) -> dict[str, list[str]]:
-        """Side -> the recorded names of the markers on its foot: those on the segment of heel and toe."""
+        """Side -> the recorded names of the markers on its foot: those on the segment of heel and toe. None of a foot
+        that is `half_marked`: where its sole is, and what it bears, nobody sees."""
+        half = self.half_marked
+        return {side: [] if side in half else names for side, names in self._on_feet().items()}
+
+    @property
+    def half_marked(self) -> dict[str, tuple[str, str]]:
+        """Side of a foot that has a single marker while the other has several -> the recorded names of that marker and
+        of one on the other foot whose like is not seen."""
+        found = {}
+        feet = self._on_feet()
+        for side, other in (("right", "left"), ("left", "right")):
+            if len(feet[side]) == 1 and len(feet[other]) > 1:
+                lone = next(key for key, name in self.names.items() if name == feet[side][0])
+                lost = next(
+                    name
+                    for (key, own), name in self.names.items()
+                    if own == other and name in feet[other] and key != lone[0]
+                )
+                found[side] = (feet[side][0], lost)
+        return found
+
+    def _on_feet(self) -> dict[str, list[str]]:
         set_ = self.marker_set
         segments = {set_.marker(name).segment for name in set_.heel_toe or ()} | {"foot", "toes"}
         own = [marker.name for marker in set_.markers if marker.segment in segments]

@@ -205,7 +205,7 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
     if asked is not None:
         found = checked(recording, match_markers(asked, recording.marker_names, recording.seen, where))
         _refuse_wrong_set(found, where)
-        return found
+        return replace(found, messages=(*found.messages, *half_marked_words(found.match)))
     ranked = fits(recording.seen_names)
     try:
         usable = _usable(ranked, where)
@@ -230,8 +230,22 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
     messages = [note("marker set", choice), *best.messages]
     if doubtful:
         messages.insert(1, _guessed_words(recording, len(doubtful), f" ({_places(doubtful)})"))
+    messages += half_marked_words(best.match)
     match = replace(best.match, guessed=tuple(guess.recorded for guess in doubtful))
     return Recognised(match, tuple(messages), best.wrong_n)
+
+
+def half_marked_words(match: MarkerMatch) -> list[Message]:
+    """A warning of each foot of which a single marker is left while the other has several."""
+    return [
+        warning(
+            "labels",
+            f"the {side} foot is seen by {lone} alone, the other by {lost} as well: what stands under it is not known "
+            "by its markers, and the angles of its ankle are hardly. Look in the file whether its other markers are "
+            "there under another name, or empty.",
+        )
+        for side, (lone, lost) in match.half_marked.items()
+    ]
 
 
 def _enlarged(recording: Recording, found: Recognised) -> tuple[Recognised, list[Guess]]:
@@ -362,7 +376,8 @@ def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[Marke
     when = ""
     if swap.span_s is not None:
         when = f" from {swap.span_s[0]:.2f} to {swap.span_s[1]:.2f} s"
-    looks = f"{swap.what} look swapped{when} ({swap.evidence})"
+    who = swap.what if swap.what.startswith("all ") else f"markers {swap.what}"  # no name begins a sentence
+    looks = f"{who} look swapped{when} ({swap.evidence})"
     later = swap.span_s is not None and swap.span_s[0] > start_s + _START_S
     if swap.share < _SHORT or (later and swap.share < _HALF):
         return match, warning(
@@ -399,7 +414,7 @@ def _misplaced(
             return wrong
         k = int(np.argmax(n + far.sum(axis=1) / (1.0 + far.sum())))
         j = int(np.argmax(np.where(beyond[k], far[k], 0.0)))
-        wrong[k] = distance_words(
+        wrong[k] = "markers " + distance_words(
             match.names[keys[k]], match.names[keys[j]], float(found.distance[order[k], order[j]]),
             float(expected.distance[k, j]) * height_m,
         )  # fmt: skip

@@ -206,7 +206,7 @@ def _uncovered_in_words(recording: Recording, table: Table, covered: Flags) -> t
     if covered.all():
         return ()
     text = (
-        f"{table.path.name} has forces from {table.time[0]:g} s to {table.time[-1]:g} s, markers go from "
+        f"the table {table.path.name} has forces from {table.time[0]:g} s to {table.time[-1]:g} s, markers go from "
         f"{recording.time[0]:g} s to {recording.time[-1]:g} s: in {np.count_nonzero(~covered)} of {len(covered)} "
         "frames the plates are not measured."
     )

@@ -9,9 +9,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import by_neighbours, runs
+from dynakin.arrays import by_neighbours
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
+from dynakin.recordings.formats.filled import held, repeated, straight
+from dynakin.recordings.formats.jumps import without_jumps
 from dynakin.recordings.recording import Array
 from dynakin.recordings.times import rate_of, step_of
 from dynakin.units import length_factor
@@ -23,16 +25,6 @@ _SAME_M = 3e-3
 """Distance up to which two trajectories are one marker's, rounded or filtered otherwise: balls of 6 mm touch there."""
 _MOVES_M_S = 0.1
 """Speed, median over the markers, from which the person moves."""
-_ROUNDED = 4.0
-"""Of the file's smallest steps of a marker: by more no line bends that was drawn over a gap. Feet on a moving belt, raw
-or low-passed, bend by 28 and more."""
-_KINK = 20.0
-"""By so many the marker bends at an end of such a line."""
-_FINE, _FINEST_M = 50.0, 1e-7
-"""By so many it bends half of the time it moves, or the file is too coarse to tell; a smallest step is at least as
-large, which is what single precision leaves of 1 m."""
-_LINE_FRAMES, _LINE_S, _LINE_M = 8, 0.08, 0.01
-"""How long and how far such a line is at least."""
 _MOST_REPEATED = 0.2
 """Part of the frames that may repeat others: more is another rate, written as this one."""
 _EVEN = 0.2
@@ -147,7 +139,8 @@ def _labels(name: str, places: list[Array], taken: set[str]) -> list[str]:
 
 def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Path) -> tuple[Array, list[Message]]:
     """Markers (T, M, 3) without what was never measured: a point that has any coordinate missing, or is exactly 0, 0,
-    0, is NaN as a whole, and so are frames that repeat the one before and gaps that were filled by straight lines.
+    0, is NaN as a whole, and so are frames that repeat the one before, gaps that were filled and markers that jumped
+    off their place.
 
     Several systems export an occluded marker as the laboratory's origin; no marker is ever there to the last
     bit.
@@ -168,7 +161,7 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
     partial = np.isnan(markers).any(axis=2)
     markers[origin | partial] = np.nan
     rate = rate_of(time)
-    again, lines = _repeated(markers, rate), _straight(markers, rate)
+    again, lines, stays = repeated(markers, rate), straight(markers, rate), held(markers, rate)
     if again.any():
         first = int(np.flatnonzero(again)[0])
         text = (
@@ -194,7 +187,21 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
             )
         )
         markers[lines] = np.nan
+    if (stays := stays & ~again[:, None]).any():
+        who = ", ".join(name for name, hit in zip(names, np.asarray(stays.any(axis=0)), strict=True) if hit)
+        first = int(np.flatnonzero(stays.any(axis=1))[0])
+        notes.append(
+            warning(
+                "recording",
+                f"gaps were filled by the last place before them, to the last digit: {who}, first at "
+                f"{time[first]:.3f} s. They are taken as missing ({np.count_nonzero(stays)} samples); export the "
+                "recording without filled gaps.",
+            )
+        )
+        markers[stays] = np.nan
     notes += _left_out(markers, time)
+    markers, said = without_jumps(names, markers, time, rate)
+    notes += said
     missing: npt.NDArray[np.bool_] = (
         np.isnan(markers[:, :, 0]) if markers.size else np.zeros(markers.shape[:2], dtype=bool)
     )
@@ -239,24 +246,6 @@ def _without_placeholders(names: tuple[str, ...], markers: Array) -> tuple[Array
     return np.where(found[:, :, None], np.nan, markers), [note("recording", text)]
 
 
-def _repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
-    """(T,) frames that are the one before to the last bit while the person moves on both sides of them: dropped ones
-    that a system filled, or a rate that was doubled by writing each frame twice."""
-    seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(markers).all(axis=2))
-    both = seen[1:] & seen[:-1] & (seen.sum(axis=1) > 2)[1:, None]
-    steps = np.where(both, np.linalg.norm(np.diff(markers, axis=0), axis=2), np.inf)
-    half = np.maximum(both.sum(axis=1) - 1, 0) // 2
-    middle = np.take_along_axis(np.sort(steps, axis=1), half[:, None], axis=1)[:, 0]
-    step = np.concatenate([[np.inf], middle])  # of half of the markers: of one it may be a rounded digit
-    still = both.any(axis=1) & (seen[1:] == seen[:-1]).all(axis=1) & (np.where(both, steps, 0.0) == 0.0).all(axis=1)
-    same = np.concatenate([[False], still])
-    least = max(_MOVES_M_S / rate, _ROUNDED * _smallest_step(markers))
-    found = np.zeros(len(markers), dtype=bool)
-    for first, end in runs(same):
-        found[first:end] = first > 1 and end < len(step) and min(step[first - 1], step[end]) > least
-    return found
-
-
 def _left_out(markers: Array, time: Array) -> list[Message]:
     """A warning of frames that were dropped and the times numbered on: all markers move between two frames as far as in
     several, by a cubic through their steps before and after. Where the times are uneven, or scatter, these are not
@@ -288,37 +277,6 @@ def _left_out(markers: Array, time: Array) -> list[Message]:
             "with every frame.",
         )
     ]
-
-
-def _smallest_step(places: Array) -> float:
-    """Of any coordinate (T, ...) from frame to frame, m: what the file rounds to; inf where nothing moves."""
-    steps = np.abs(np.diff(places, axis=0))
-    return float(np.min(steps, where=steps > 1e-9, initial=np.inf))
-
-
-def _straight(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
-    """(T, M) samples within straight lines at a steady speed, to the file's last digit: gaps that a system filled."""
-    found = np.zeros(markers.shape[:2], dtype=bool)
-    if len(markers) < 3 or not np.isfinite(rate):
-        return found
-    bend = np.linalg.norm(np.diff(markers, n=2, axis=0), axis=2)
-    step = np.linalg.norm(np.diff(markers, axis=0), axis=2)
-    for m in range(markers.shape[1]):
-        moving = bend[(step[1:, m] * rate > _MOVES_M_S) & np.isfinite(bend[:, m]), m]
-        if len(moving) < _LINE_FRAMES:
-            continue
-        tick = max(_smallest_step(markers[:, m]), _FINEST_M)
-        if not float(np.median(moving)) > _FINE * tick:
-            continue
-        with np.errstate(invalid="ignore"):
-            straight = bend[:, m] <= _ROUNDED * tick
-        for first, end in runs(straight):
-            ends = bend[[k for k in (first - 1, end) if 0 <= k < len(bend)], m]
-            kinks = bool(np.nanmax(ends, initial=0.0) > _KINK * tick)
-            length = float(np.linalg.norm(markers[end + 1, m] - markers[first, m]))
-            if kinks and end - first >= max(_LINE_FRAMES, _LINE_S * rate) and length > _LINE_M:
-                found[first + 1 : end + 1, m] = True
-    return found
 
 
 def timing_notes(time: Array, rate_in_header: float | None = None) -> list[Message]:
