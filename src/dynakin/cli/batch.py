@@ -52,7 +52,13 @@ def batch(
     options = Options(tuple(preset or found.presets), cutoff, not tables_only)
     subjects = sorted({session.subject for session in found.sessions})
     folder = open_folder(found.output, ("table2", "batch.", "trials.", *subjects))
-    journal = Journal(folder / ROWS, belongs_to(found, options, identify=identify), None if identify else TRIALS)
+    subject_of = {session.name: session.subject for session in found.sessions} if identify else {}
+
+    def together(key: str) -> str:
+        """A subject is identified on all its trials, and these start from what was found."""
+        return subject_of.get(key, key)
+
+    journal = Journal(folder / ROWS, belongs_to(found, options, identify=identify), TRIALS, together)
     identified = {}
     with open_pool(backend, jobs, scheduler) as pool:
         if identify:

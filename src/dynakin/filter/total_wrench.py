@@ -423,7 +423,7 @@ def _undeclared_in_words(
                 "weight",
                 f"the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
                 f"(by the motion {load + up / GRAVITY_M_S2:.1f} kg): the mass "
-                "is wrong, a plate is missing, plates and markers are out of step by over half a second, or something "
+                "is wrong, a plate is missing, plates and markers are out of step, or something "
                 f"that no plate measures bears or pulls the person (a seat, a weight, a cable, a rail){unit}. The "
                 "plates are not used for the total.",
             )

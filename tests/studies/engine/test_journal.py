@@ -32,3 +32,18 @@ def test_what_rows_depend_on_may_not(tmp_path: Path, now: dict[str, object], of_
     Journal(path, of(1, 1), of_rows).add("first", {"value": 1.0})
     with pytest.raises(OutputError, match="belongs to other settings"):
         Journal(path, now, of_rows)
+
+
+def test_rows_that_depend_on_what_changed_are_done_again(tmp_path: Path) -> None:
+    """Of a subject that was identified on all its trials, one of which was mended; another subject's are kept."""
+    path = tmp_path / "rows.jsonl"
+
+    def journal(second: int) -> Journal:
+        belongs = {"trials": {"a/1": 1, "a/2": second, "b/1": 1}}
+        return Journal(path, belongs, "trials", lambda key: key.split("/")[0])
+
+    begun = journal(1)
+    for key in ("a", "a/1", "b", "b/1"):
+        begun.add(key, {"value": 1.0})
+    assert set(journal(2).rows) == {"b", "b/1"}
+    assert set(journal(2).rows) == {"b", "b/1"}  # as it was written

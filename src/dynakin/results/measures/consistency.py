@@ -268,11 +268,14 @@ def speed_mismatch(time: np.ndarray, coordinates: np.ndarray, speeds: np.ndarray
     return rms(speeds - derivative, axis=0), rms(derivative, axis=0)
 
 
-def mismatch_in_words(names: list[str], rotation: np.ndarray, mismatch: np.ndarray, moving: np.ndarray) -> str:
-    """One sentence about the coordinates whose speeds do not fit, the worst first, or an empty text where all do."""
+def mismatch_in_words(
+    names: list[str], rotation: np.ndarray, mismatch: np.ndarray, moving: np.ndarray, stated: np.ndarray
+) -> str:
+    """One sentence about the coordinates whose speeds do not fit, the worst first, or an empty text where all do. A
+    speed that is off by less than it says itself (``stated``, (C,), RMS of its deviations) fits."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(mismatch > 0.0, mismatch / moving, 0.0)
-    wrong = np.flatnonzero((ratio > TOLERATED) & (mismatch > UNNOTICED))
+    wrong = np.flatnonzero((ratio > TOLERATED) & (mismatch > np.fmax(stated, UNNOTICED)))
     if not len(wrong):
         return ""
     wrong = wrong[np.argsort(-mismatch[wrong])]

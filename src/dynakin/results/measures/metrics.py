@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dynakin.arrays import widened
+from dynakin.arrays import rms, widened
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.adaptation import adaptation
@@ -183,12 +183,13 @@ def speed_consistency(estimate: Estimate, window: np.ndarray) -> tuple[dict[str,
     """How far each speed is from the derivative of its coordinate, and a sentence, empty where all fit. Frames in which
     nothing is known of a speed do not count, nor do those next to them, whose derivative they are part of."""
     names = estimate.coordinate_names
-    unknown = np.isnan(estimate.values("speeds_sd"))
+    sd = estimate.values("speeds_sd")
+    unknown = np.isnan(sd)
     beside = np.stack([widened(column, 1) for column in unknown.T], axis=1)
     coordinates, speeds = (estimate.values(name)[window] for name in ("coordinates", "speeds"))
     mismatch, moving = speed_mismatch(estimate.time[window], coordinates, np.where(beside[window], np.nan, speeds))
     finite = {name: float(value) for name, value in zip(names, mismatch, strict=True) if np.isfinite(value)}
-    return finite, mismatch_in_words(names, estimate.is_rotation(), mismatch, moving)
+    return finite, mismatch_in_words(names, estimate.is_rotation(), mismatch, moving, rms(sd[window], axis=0))
 
 
 def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -63,16 +63,20 @@ class Journal:
     Args:
         path: the file; made when the first row comes, in a folder that exists.
         belongs_to: plain data: everything on which the rows depend. It stands in the heading.
-        of_rows: a key of it under which stands, by the rows' keys, what one row alone depends on: that of rows which
-            are not there (failed, or never begun) may change.
+        of_rows: a key of it under which stands, by the rows' keys, what a row depends on: that of rows which are not
+            there (failed, or never begun) may change.
+        group: of a row's key what names the rows that depend on all of each other's: these are dropped, and their tasks
+            done again, where something of the group changed. By default each row depends on its own alone.
 
     Raises:
         OutputError: the file cannot be read, is none of ours, or belongs to something else; what changed is named.
     """
 
-    def __init__(self, path: Path, belongs_to: Any, of_rows: str | None = None) -> None:
+    def __init__(
+        self, path: Path, belongs_to: Any, of_rows: str | None = None, group: Callable[[str], str] = str
+    ) -> None:
         self.path = path
-        self._of_rows = of_rows
+        self._of_rows, self._group = of_rows, group
         self._heading = {"dynakin_journal": VERSION, "belongs_to": json.loads(json.dumps(belongs_to))}
         self.rows = self._read()
 
@@ -106,23 +110,37 @@ class Journal:
                 "folder, or remove it, and all is worked out again"
             )
         if digest(before) != digest(now):
-            fresh = self.path.with_suffix(".new")
-            fresh.write_bytes(b"".join(line + b"\n" for line in (json.dumps(self._heading).encode(), *whole[1:])))
-            fresh.replace(self.path)
-            return found
+            return self._begun_anew(found, self._changed(before, now))
         kept = sum(len(line) + 1 for line in whole)
         with self.path.open("r+b") as file:
             file.truncate(kept)
         return found
 
     def _of(self, belongs_to: Any, rows: dict[str, Row]) -> Any:
-        """What these rows depend on."""
-        if self._of_rows is None or not isinstance(belongs_to, dict):
-            return belongs_to
-        each = belongs_to.get(self._of_rows)
-        if not isinstance(each, dict):
+        """What these rows depend on by themselves."""
+        each = self._each(belongs_to)
+        if each is None:
             return belongs_to
         return {**belongs_to, self._of_rows: {key: value for key, value in each.items() if key in rows}}
+
+    def _each(self, belongs_to: Any) -> dict[str, Any] | None:
+        each = belongs_to.get(self._of_rows) if self._of_rows and isinstance(belongs_to, dict) else None
+        return each if isinstance(each, dict) else None
+
+    def _changed(self, before: Any, now: Any) -> set[str]:
+        """Groups in which something changed."""
+        was, is_now = self._each(before) or {}, self._each(now) or {}
+        return {self._group(key) for key in {**was, **is_now} if digest(was.get(key)) != digest(is_now.get(key))}
+
+    def _begun_anew(self, rows: dict[str, Row], changed: set[str]) -> dict[str, Row]:
+        """The file with the heading as it is now, without rows of these groups."""
+        kept = {key: row for key, row in rows.items() if self._group(key) not in changed}
+        lines = [self._heading, *(with_nulls({"key": key, "row": row}) for key, row in kept.items())]
+        fresh = self.path.with_suffix(".new")
+        with writing(self.path.parent):
+            fresh.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8", newline="\n")
+            fresh.replace(self.path)
+        return kept
 
     def add(self, key: str, row: Row) -> None:
         """Append one row; it is on its way to the disk when this returns.
