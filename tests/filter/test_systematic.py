@@ -420,6 +420,16 @@ def test_measured_moments_count_more_where_some_foot_stands_off_the_plates_and_p
     np.testing.assert_allclose(at_once, [[now, now], [now, 1.0]])
 
 
+@pytest.mark.parametrize(("hz", "left"), [(200.0, STILL), (100.0, STILL), (50.0, 1.0), (25.0, 1.0), (80.0, 0.390625)])
+def test_of_smoothed_moments_more_is_unseen_the_further_frames_are_apart(hz: float, left: float) -> None:
+    own = {"speeds": np.ones((1, 1)), "moments": np.ones((1, 1))}
+    parts = {kind: {block: np.zeros((1, 1)) for block in own} for kind in (*KINDS, "inertia")}
+    found = reported(NONE, 1.0, own, parts, np.zeros(1), np.zeros(1), late=True, step_s=1.0 / hz)
+    np.testing.assert_allclose([found["moments"] ** 2, found["speeds"] ** 2], [[[left]], [[STILL]]])
+    at_once = reported(NONE, 1.0, own, parts, np.zeros(1), np.zeros(1), late=False, step_s=1.0 / hz)
+    np.testing.assert_allclose(at_once["moments"] ** 2, OWN_AT_ONCE["moments"][0])
+
+
 def with_inertia() -> tuple[Any, Array]:
     """The model whose shank's mass and first moments are estimated, and its state."""
     model = spec()

@@ -26,6 +26,7 @@ from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import UNMEASURED
+from dynakin.recordings.times import step_of
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import DERIVED, MEASURED, in_use, moment_sources, plates_refused
 from dynakin.results.naming import listed, words
@@ -311,13 +312,14 @@ class Systematic:
         late: bool,
         used: Flags | None = None,
         wrench_rate: Array | None = None,
+        step_s: float = np.nan,
     ) -> dict[str, Array]:
         """The filter's standard deviations of one frame (block -> (C,)) with these errors.
 
         Args:
             x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. sources, off_plates,
-                late: as of `reported`. used: as of `parts`. wrench_rate: (F, 6) by how much the wrenches change a
-                second; not given: not at all.
+                late, step_s: as of `reported`. used: as of `parts`. wrench_rate: (F, 6) by how much the wrenches change
+                a second; not given: not at all.
         """
         inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
         own = {block: found[block] for block in BLOCKS}
@@ -326,8 +328,9 @@ class Systematic:
         parts = self._at(x, inertia, wrench, segments, used, wrench_rate)
         moved = self.moved_m(x)
         return reported(
-            self.sizes, self._variance_scale, own, parts, intense, moved, sources, off_plates=off_plates, late=late
-        )
+            self.sizes, self._variance_scale, own, parts, intense, moved, sources,
+            off_plates=off_plates, late=late, step_s=step_s,
+        )  # fmt: skip
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
@@ -337,7 +340,8 @@ class Systematic:
         sources[plates_refused(data)[:, None] & (sources == DERIVED)] = MEASURED  # no surer than if they were believed
         found = self.over_time(data), self.intensity(data), moved, sources
         off_plates = any_off_plates(data, self._feet)
-        sd = reported(self.sizes, self._variance_scale, own, *found, off_plates=off_plates, late=late)
+        step_s = step_of(data["time"].values)
+        sd = reported(self.sizes, self._variance_scale, own, *found, off_plates=off_plates, late=late, step_s=step_s)
         return data.assign({f"{block}_sd": (("time", "coordinate"), sd[block]) for block in BLOCKS})
 
     def moved_m(self, x: Array) -> Array:

@@ -23,6 +23,7 @@ from dynakin.filter.systematic import Systematic, stands_off_plates
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
+from dynakin.recordings.times import step_of
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from dynakin.results.records import NO_ESTIMATE
 from dynakin.settings.lag import check_can_smooth
@@ -243,7 +244,7 @@ class Tracker:
             found |= self.systematic.added(
                 found, state, covariance, wrench, segments,
                 sources=sources, off_plates=self._off_plates, late=late, used=used,
-                wrench_rate=rate,
+                wrench_rate=rate, step_s=step_of(np.array([each.time_s for each in self._stepped])),
             )  # fmt: skip
         if step is not None:
             found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])
