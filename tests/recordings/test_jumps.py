@@ -96,3 +96,12 @@ def test_one_who_is_carried_off_by_a_dropped_frame_does_not_jump() -> None:
     time, markers = swinging(1e-4)
     found, said = cleaned(time[:-3], np.delete(markers, slice(150, 153), axis=0))
     assert np.isfinite(found).all() and all("jump" not in text for text in said)
+
+
+def test_a_jump_by_which_a_marker_comes_home_ends_what_began_unseen() -> None:
+    """It crept away; what follows the jump is its place, not what went before."""
+    time, markers = swinging(1e-4)
+    markers[100:160, 0] += np.linspace(0.0, 1.0, 60)[:, None] * [0.04, 0.0, 0.0]
+    found, said = cleaned(time, markers)
+    assert np.isnan(found[125:160, 0]).all() and np.isfinite(found[160:]).all() and np.isfinite(found[:100]).all()
+    assert len(said) == 1 and "do not come back" not in said[0]

@@ -89,6 +89,15 @@ def lost_in(data: np.ndarray, rate: float = 100.0) -> np.ndarray:
     return np.flatnonzero(frozen(data, data[:, 1], rate))
 
 
+@pytest.mark.parametrize("after", [None, np.nan])
+def test_rows_that_repeat_until_nothing_follows_are_frozen(after: float | None) -> None:
+    data = rows()
+    data[120:] = data[120]
+    if after is not None:
+        data[190:] = after
+    np.testing.assert_array_equal(lost_in(data), np.arange(121, N if after is None else 190))
+
+
 def test_rows_that_repeat_and_then_jump_are_frozen() -> None:
     data = rows()
     data[110:125] = data[110]

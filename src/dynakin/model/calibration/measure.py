@@ -42,7 +42,7 @@ from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_labora
 from dynakin.recordings.landmarks import plain_name
 from dynakin.recordings.orientation import against_vertical, axis_vector, walks
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.standing import standing_window
+from dynakin.recordings.standing import MIN_STILL_S, standing_window
 from dynakin.results.naming import listed, words
 from dynakin.settings.subject import Subject
 
@@ -142,7 +142,7 @@ def told_of_the_static(recording: Recording, static: Recording | None) -> Iterat
         if static is None or not other:
             raise
         text = f"{refusal.message}. Of the standing trial {static.path or static.name}: {other}"
-        raise type(refusal)(text) from None
+        raise type(refusal)(text, asks_for=refusal.asks_for) from None
 
 
 def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
@@ -159,7 +159,8 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     marked = _marked(asked, trials, messages)
     model, finder, locks = marked.model, marked.finder, marked.locks
     still = _calibration_frames(asked, trials, marked, messages)
-    if asked.static is not None and not still.stands:
+    long_enough = asked.static is not None and np.ptp(asked.static.time) >= MIN_STILL_S
+    if asked.static is not None and long_enough and not still.stands:
         text = (
             f"nobody stands still in {asked.static.name} (--static): lengths and marker places are measured on frames "
             "in which the person moves. Give a trial of standing, or none."

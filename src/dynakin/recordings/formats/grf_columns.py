@@ -69,6 +69,10 @@ def parse_column(name: str) -> tuple[str, str, str] | None:
     return plate, quantity, axis
 
 
+_UNITS = {"n", "kn", "lb", "lbf", "kgf", "kg", "bw", "%bw", "m", "cm", "mm", "in", "nm", "nmm", "knm", "ncm", "v", "mv"}
+"""What stands in brackets and is a unit, small and without points and blanks; "(left)" is none."""
+
+
 def other_unit(name: str) -> str | None:
     """The unit in brackets behind a ground-force column's name that is not the one that is taken, None without one."""
     behind = re.search(r"[\[(]([^\[()\]]*)[\])]\s*$", name)
@@ -76,7 +80,8 @@ def other_unit(name: str) -> str | None:
     if behind is None or parsed is None:
         return None
     unit = re.sub(r"[\s.*\u00b7]", "", behind[1].casefold())
-    return None if unit == {"force": "n", "point": "m", "torque": "nm"}[parsed[1]] else behind[1]
+    taken = {"force": "n", "point": "m", "torque": "nm"}[parsed[1]]
+    return behind[1] if unit in _UNITS and unit != taken else None
 
 
 def group_columns(names: tuple[str, ...]) -> tuple[list[PlateColumns], list[str]]:

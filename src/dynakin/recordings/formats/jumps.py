@@ -175,40 +175,66 @@ def _exchanged(markers: Array, found: list[_Jump]) -> dict[tuple[int, int], npt.
 
 def _off_place(markers: Array, found: list[_Jump], start: int) -> list[_Stretch]:
     """Between a jump and the jump back, or the next gap, after which a marker is found anew; else until it has crept
-    back to its place, or to the end."""
+    back to its place, or to the end. A jump by which one comes to its place ends what began unseen."""
     stretches: list[_Stretch] = []
     for m in dict.fromkeys(jump.marker for jump in found):
         own = [jump for jump in found if jump.marker == m]
         gaps = [first for first, _ in runs(~np.isfinite(markers[:, m, 0]))]
+        apart = np.linalg.norm(markers[:, _nearest(markers, m)] - markers[:, m : m + 1], axis=2)
         after = 0
         for k, jump in enumerate(own):
             if jump.frame <= after or np.linalg.norm(jump.by_m) < _JUMP_M:
                 continue
-            ends = [frame for frame in gaps if frame > jump.frame]
-            ends += [later.frame for later in own[k + 1 :] if _is_back(jump, later)]
-            first, after = jump.frame, min([*ends, _crept_back(markers, jump, start)])
+            ends = [next((frame for frame in gaps if frame > jump.frame), len(markers))]
+            ends.append(next((later.frame for later in own[k + 1 :] if _is_back(jump, later)), len(markers)))
+            first, before = jump.frame, after
+            after = _crept_back(apart, jump, start, min(ends))
             if after == len(markers) and first < start:
                 first, after = 0, first  # what lasts is its place
-            stretches.append(_Stretch(m, first, after, float(np.linalg.norm(jump.by_m))))
+            elif after == len(markers) and _comes_home(apart, jump.frame, start):
+                at = _usual(apart, range(start))
+                home = _within(apart, at, _BACK * float(np.linalg.norm(jump.by_m)))[before:first]
+                first, after = before + 1 + int(np.flatnonzero(home)[-1]) if home.any() else first, first
+            if first < after:
+                stretches.append(_Stretch(m, first, after, float(np.linalg.norm(jump.by_m))))
     return stretches
 
 
-def _crept_back(markers: Array, jump: _Jump, start: int) -> int:
-    """The frame from which a marker is as far from those near to it as before the jump, as far as these distances show
-    the jump; the trial's end where it never is."""
-    m, frame, never = jump.marker, jump.frame, len(markers)
-    near = _nearest(markers, m)
-    apart = np.linalg.norm(markers[:, near] - markers[:, m : m + 1], axis=2)
-    usual = np.median(apart[max(frame - start, 0) : frame], axis=0)
+def _usual(apart: Array, frames: range) -> Array:
+    """(K,) usual distances of a marker from those near it in some frames; NaN where they are not seen."""
+    some = apart[frames.start : frames.stop]
+    seen = np.isfinite(some).any(axis=0)
+    return np.where(seen, np.nanmedian(np.where(seen, some, 0.0), axis=0), np.nan)
+
+
+def _within(apart: Array, usual: Array, by_m: float) -> npt.NDArray[np.bool_]:
+    """(T,) whether all distances (T, K) are the usual ones (K,), of those that are known."""
     known = np.isfinite(usual)
-    if not known.any():
-        return never
     with np.errstate(invalid="ignore"):
-        there = (np.abs(apart - usual)[:, known] < _BACK * np.linalg.norm(jump.by_m)).all(axis=1)
-    if there[frame : frame + _BESIDE + 1].all():
-        return never
-    stays = [first for first, end in runs(there) if first > frame and end - first >= start // 2]
-    return min(stays, default=never)
+        return np.asarray((np.abs(apart - usual)[:, known] < by_m).all(axis=1))
+
+
+def _comes_home(apart: Array, frame: int, start: int) -> bool:
+    """Whether a marker lies among those near to it as at the start rather after a jump than before."""
+    home, before, behind = (
+        _usual(apart, part) for part in (range(start), range(max(frame - start, 0), frame), range(frame, frame + start))
+    )
+    known = np.isfinite(home + before + behind)
+    return bool(known.any() and np.linalg.norm((behind - home)[known]) < np.linalg.norm((before - home)[known]))
+
+
+def _crept_back(apart: Array, jump: _Jump, start: int, end: int) -> int:
+    """The frame before ``end`` from which a marker is as far from those near to it (T, K) as before the jump, as far as
+    these distances show the jump; ``end`` where it never is."""
+    frame = jump.frame
+    usual = np.median(apart[max(frame - start, 0) : frame], axis=0)
+    if not np.isfinite(usual).any():
+        return end
+    there = _within(apart[frame:end], usual, _BACK * float(np.linalg.norm(jump.by_m)))
+    if there[: _BESIDE + 1].all():
+        return end
+    stays = [frame + first for first, past in runs(there) if first > 0 and past - first >= start // 2]
+    return min(stays, default=end)
 
 
 def _is_back(jump: _Jump, later: _Jump) -> bool:

@@ -52,12 +52,13 @@ def frozen(rows: Array, push: Array, rate_hz: float) -> Flags:
     smallest = np.min(np.where(change > 0.0, change, np.inf), axis=0)
     for first, end in held:
         length = end - first + 1
-        if length < max(FROZEN, FROZEN_S * rate_hz, FROZEN * usual) or end >= len(change):
+        if length < max(FROZEN, FROZEN_S * rate_hz, FROZEN * usual):
             continue
         near = np.concatenate([change[max(first - 1 - length, 0) : max(first - 1, 0)], change[end + 1 : end + length]])
         usually = np.nanmedian(near, axis=0) if len(near) else np.zeros(rows.shape[1])
-        jump = change[end]
-        if (jump > np.maximum(JUMP * usually, STEPS * smallest)).any():
+        stands_still = end >= len(change) or not np.isfinite(change[end]).any()  # until nothing follows
+        jump, least = (usually, 0.0) if stands_still else (change[end], JUMP * usually)
+        if (jump > np.maximum(least, STEPS * smallest)).any():
             found[first + 1 : end + 1] = True  # the first of them was measured
     return found
 
@@ -72,8 +73,8 @@ def frozen_in_words(name: str, time: Array, lost: Flags) -> list[Message]:
         warning(
             "plates",
             f"{name} repeats one and the same row while somebody stands on it, from {', '.join(spans[:3])}{more}, "
-            "and then jumps: not measured there. Export the forces again, or look whether their recording was "
-            "interrupted.",
+            "though its load moved before or jumps after: not measured there. Export the forces again, or look whether "
+            "their recording was interrupted.",
         )
     ]
 

@@ -34,7 +34,8 @@ _KINDS = (
     _Kind(
         "Mass",
         ("weight",),
-        "Give the mass as weighed, with all that is worn; what else bears or pulls the person is declared (--contact).",
+        "Give the mass as weighed, with all that is worn; what is carried is declared ([[loads]] in a configuration, "
+        "docs/models.md), what else bears or pulls the person by --contact.",
     ),
     _Kind("Subject", ("mass", "height", "sex"), "Give the mass and the height as measured (--mass, --height)."),
     _Kind(
