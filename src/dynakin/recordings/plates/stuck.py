@@ -26,6 +26,8 @@ higher rate repeats each row)."""
 JUMP, STEPS = 3.0, 5.0
 """Rows that were frozen come free with a jump: of some channel, more than so many times what it changes by in a row
 next to it, and so many times its smallest change (a file may round, and a person stand still)."""
+BEFORE_S = 0.2
+"""Where nothing follows, a channel has usually changed by so many smallest changes in the rows of this time before."""
 PRESS_S, CHANGES = 0.2, 0.2
 """A press so long, through which the vertical force changes by so large a part of its largest value, moves the other
 forces and the centre of pressure: what stands still then is no person."""
@@ -56,8 +58,11 @@ def frozen(rows: Array, push: Array, rate_hz: float) -> Flags:
             continue
         near = np.concatenate([change[max(first - 1 - length, 0) : max(first - 1, 0)], change[end + 1 : end + length]])
         usually = np.nanmedian(near, axis=0) if len(near) else np.zeros(rows.shape[1])
-        stands_still = end >= len(change) or not np.isfinite(change[end]).any()  # until nothing follows
-        jump, least = (usually, 0.0) if stands_still else (change[end], JUMP * usually)
+        if end >= len(change) or not np.isfinite(change[end]).any():  # nothing follows to jump to
+            before = change[max(first - 1 - round(BEFORE_S * rate_hz), 0) : max(first - 1, 0)]
+            jump, least = np.median(before, axis=0) if len(before) else 0.0 * smallest, 0.0
+        else:
+            jump, least = change[end], JUMP * usually
         if (jump > np.maximum(least, STEPS * smallest)).any():
             found[first + 1 : end + 1] = True  # the first of them was measured
     return found
