@@ -56,14 +56,13 @@ def frozen(rows: Array, push: Array, rate_hz: float) -> Flags:
         length = end - first + 1
         if length < max(FROZEN, FROZEN_S * rate_hz, FROZEN * usual):
             continue
-        near = np.concatenate([change[max(first - 1 - length, 0) : max(first - 1, 0)], change[end + 1 : end + length]])
+        ends_so = end >= len(change) or not np.isfinite(change[end]).any()  # nothing follows to jump to
+        reach = round(BEFORE_S * rate_hz) if ends_so else length
+        near = change[max(first - 1 - reach, 0) : max(first - 1, 0)]
+        near = near if ends_so else np.concatenate([near, change[end + 1 : end + length]])
         usually = np.nanmedian(near, axis=0) if len(near) else np.zeros(rows.shape[1])
-        if end >= len(change) or not np.isfinite(change[end]).any():  # nothing follows to jump to
-            before = change[max(first - 1 - round(BEFORE_S * rate_hz), 0) : max(first - 1, 0)]
-            jump, least = np.median(before, axis=0) if len(before) else 0.0 * smallest, 0.0
-        else:
-            jump, least = change[end], JUMP * usually
-        if (jump > np.maximum(least, STEPS * smallest)).any():
+        moves = usually > STEPS * smallest
+        if (moves if ends_so else change[end] > np.maximum(JUMP * usually, STEPS * smallest)).any():
             found[first + 1 : end + 1] = True  # the first of them was measured
     return found
 
