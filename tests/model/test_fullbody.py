@@ -120,9 +120,7 @@ def test_the_filter_follows_a_moving_body_at_any_heading_without_knowing_which()
     time = np.arange(200) / RATE
     x = states(initial, squat(time), 2.0, np.array([0.5, 0.0, -0.7]), time)
     trial = recording_of(initial, x, time, noise_m=0.0005)
-    estimator = Estimator(
-        definition(), vertical="+Y", forward=(1.0, 0.0, 0.0), estimate=["lengths", "markers", "inertia"]
-    )
+    estimator = Estimator(definition(), vertical="+Y", estimate=["lengths", "markers", "inertia"])
     result = estimator.run(trial, static=standing())
     names = [str(name) for name in result.data["coordinate"].values]
     free = [c.name for c in initial.spec.coordinates if not c.locked]

@@ -137,8 +137,8 @@ def test_integer_data_and_hidden_points(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("unit", "factor", "said"),
     [
-        ("cm", 0.1, "The file is in cm; markers are written back in metres."),
-        ("inches", 1 / 25.4, "The file is in inches; markers"),
+        ("cm", 0.1, "The file's unit of length is cm; markers are written back in metres."),
+        ("inches", 1 / 25.4, "The file's unit of length is inches; markers"),
         (None, 1.0, "names no length unit: mm taken, as the markers span 1500 of them"),
         (None, 1e-3, "names no length unit: m taken, as the markers span 1.5 of them"),
         ("", 0.1, "names no length unit: cm taken, as the markers span 150 of them"),

@@ -105,3 +105,11 @@ def test_a_jump_by_which_a_marker_comes_home_ends_what_began_unseen() -> None:
     found, said = cleaned(time, markers)
     assert np.isnan(found[125:160, 0]).all() and np.isfinite(found[160:]).all() and np.isfinite(found[:100]).all()
     assert len(said) == 1 and "do not come back" not in said[0]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_of_which_one_direction_has_the_most_is_no_jump(seed: int) -> None:
+    time, markers = swinging(1e-5)
+    markers[..., 2] += np.random.default_rng(seed).normal(0.0, 3e-3, markers.shape[:2])
+    found, said = cleaned(time, markers)
+    assert not said and np.isfinite(found).all()

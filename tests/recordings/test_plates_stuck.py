@@ -81,6 +81,11 @@ def test_what_is_not_recorded_at_all_is_no_dead_channel(plates: tuple[Plate, ...
     assert without_dead_channels(made) is made
 
 
+def test_a_centre_of_pressure_that_moves_along_one_axis_on_no_plate_is_that_of_a_plane() -> None:
+    made = recorded(edited(GOOD, cop={2: 0.1}), edited(step(0.2), cop={2: 0.4}))
+    assert without_dead_channels(made) is made
+
+
 def rows() -> np.ndarray:
     return np.hstack([GOOD.force, GOOD.moment])
 

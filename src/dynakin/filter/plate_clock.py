@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.arrays import runs, wrench_about
@@ -156,7 +155,7 @@ class _Body:
     def needed(self, markers: Array, seen: Flags, rate: float) -> _Needed:
         """Of a stretch of markers (T, M, 3), which show enough in most of its frames (T,)."""
         posed = inverse_kinematics(self._initial, markers[seen])
-        q = CubicSpline(np.flatnonzero(seen), posed)(np.arange(len(markers))) if not seen.all() else posed
+        q = _through(np.flatnonzero(seen), posed, np.arange(len(markers))) if not seen.all() else posed
         q = low_pass(q, rate, CUTOFF_HZ)
         qd = np.gradient(q, 1.0 / rate, axis=0)
         motion = np.hstack([q, qd, np.gradient(qd, 1.0 / rate, axis=0)])
@@ -185,7 +184,7 @@ def _led_across(wrench: Array, seen: Flags, most: int) -> tuple[Array, Flags]:
     if not led.any():
         return wrench, led
     found = wrench.copy()
-    found[led] = CubicSpline(np.flatnonzero(known), wrench[known])(np.flatnonzero(led))
+    found[led] = _through(np.flatnonzero(known), wrench[known], np.flatnonzero(led))
     return found, led
 
 
@@ -230,3 +229,10 @@ def _solved(H: Array, values: Array, prior_sd: Array, counts: float) -> tuple[fl
     left = float(np.mean(np.square(values - scaled @ z)))
     variance = prior_sd[0] ** 2 * float(cho_solve(factor, first)[0]) * max(1.0, left)
     return float(prior_sd[0] * z[0]), variance
+
+
+def _through(at: npt.NDArray[np.intp], values: Array, wanted: npt.NDArray[np.intp]) -> Array:
+    """Values at wanted frames of the spline through others at theirs."""
+    from scipy.interpolate import CubicSpline  # loads scipy.optimize, slowly
+
+    return np.asarray(CubicSpline(at, values)(wanted))

@@ -109,8 +109,7 @@ def without_dead_channels(recording: Recording) -> Recording:
     force, cop = (np.array([getattr(press, what) for press in presses]) for what in ("force", "cop"))
     none_has = np.all(force, axis=0) & (np.all(cop, axis=0) | np.all(force))  # in a plane, or vertical forces only
     dead_force = force & ~none_has
-    # Both, or one while that axis' force is alive.
-    dead_cop = cop & (cop.all(axis=1, keepdims=True) | ~np.all(force & cop, axis=0))
+    dead_cop = cop & (cop.all(axis=1, keepdims=True) | ~np.all(cop, axis=0))  # both, or one that some press has
     plates, notes = list(recording.plates), list[Message]()
     for p, plate in enumerate(recording.plates):
         own = [k for k, press in enumerate(presses) if press.plate == p and (dead_force[k].any() or dead_cop[k].any())]
