@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dynakin.filter.augment import initial_covariance
-from dynakin.model.calibration.calibrated import JointPrior
-from dynakin.model.state_priors import cluster_covariance
+from dynakin.model.state_priors import JointPrior, cluster_covariance
 from dynakin.settings.model import Priors
 from dynakin.settings.noise import Noise
 from support.made_in_space import measured

@@ -150,7 +150,7 @@ def test_frozen_samples_of_a_c3d_are_not_measured(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("second", "shared"), [([7, 8, 9, 10, 11, 12], False), ([7, 8, 3, 4, 11, 12], True)])
 def test_plates_that_share_channels_are_named(second: list[int], shared: bool) -> None:
     listed = {"CHANNEL": {"value": np.array([[1, 2, 3, 4, 5, 6], second]).T}, "TYPE": {"value": [2, 2]}}
-    said = shared_channels(Parameters({"FORCE_PLATFORM": listed}), ["plate 1", "plate 2"])
+    said = shared_channels(Parameters({"FORCE_PLATFORM": listed}), [0, 1])
     assert [each.text.startswith("plate 2 lists the analog channels of plate 1 (numbers 3, 4 ") for each in said] == (
         [True] if shared else []
     )

@@ -65,8 +65,7 @@ def reported(
             `Systematic.over_time`. intensity: (...,) as of `movement_intensity`. moved_m: (...,) as of
             `Systematic.moved_m`. sources: (..., C) of the moments (`results.measures.sources`): the filter's own part
             of what rests on a prior counts in full, because how a jerk is seen has no part in that. off_plates: whether
-            `Sizes.own_off_plates` counts. late: whether later frames helped. step_s: s,
-            usual, from frame to frame.
+            `Sizes.own_off_plates` counts. late: whether later frames helped. step_s: usual step from frame to frame, s.
     """
     apart = float(np.fmax(step_s, STILL_TO_S)) / STILL_TO_S
     by_sizes = {

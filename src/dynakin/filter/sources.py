@@ -165,7 +165,8 @@ class ContactSources:
         self._parents = np.array([_place(self._segments, segment.parent) for segment in spec.segments])
         self._moved = [self._segments.index(name) for name in moved_segments(spec)]
         self._soles = tuple(soles)
-        self._legs = _below_the_thighs([self._segments.index(name) for name in soles], self._parents)
+        at = [self._segments.index(name) for name in soles]
+        self._legs, self._over_the_legs = _below_the_thighs(at, self._parents), _over_the_legs(at, self._parents)
 
     @classmethod
     def of(cls, initial: CalibratedModel) -> ContactSources:
@@ -192,7 +193,7 @@ class ContactSources:
         joints[np.ix_(undeclared, ~self._legs)] = ABSENT
         joints[_beyond(feet, self._soles, self._segments, self._parents)] = ABSENT
         if carried:
-            joints[:, _over_the_legs([self._segments.index(name) for name in self._soles], self._parents)] = ABSENT
+            joints[:, self._over_the_legs] = ABSENT
         return np.where(self._held, ABSENT, joints[:, self._moved]).astype(np.uint8)
 
 

@@ -15,7 +15,6 @@ from dynakin.files import is_file
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import (
     CalibratedModel,
-    JointPrior,
     first_centre_of_pressure,
     starting_state,
 )
@@ -215,7 +214,6 @@ class ModelDefinition:
         held = _not_known(plan, held)
         spec = to_core(plan)
         priors = priors or Priors()
-        together = plan.joint_prior(priors)
         state, said = starting_state(
             spec,
             bounds=plan.bounds(bounds or Bounds(), priors),
@@ -244,7 +242,7 @@ class ModelDefinition:
             feet={s.side: s.name for s in plan.model.segments if s.side is not None and "foot" in s.parts},
             unmarked_kg=unmarked_kg,
             held=held,
-            joint_prior=None if together is None else JointPrior(*together),
+            joint_prior=plan.joint_prior(priors),
             guessed_places=bool(rest.trial.match.guessed),
             unmarked_joints=rest.unmarked_joints,
             one_sided_joints=rest.one_sided_joints,

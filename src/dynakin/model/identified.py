@@ -18,8 +18,9 @@ from dynakin.elements import element
 from dynakin.errors import ModelError
 from dynakin.files import LARGEST_TEXT, read_bytes, write_text
 from dynakin.messages import note, warning
-from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.inertia import INERTIA_NAMES
+from dynakin.model.state_priors import JointPrior
 from dynakin.results.naming import listed, plural, words
 from dynakin.settings.strict import Strict, read_toml, validate
 

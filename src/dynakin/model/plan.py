@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
 from dynakin.model.schema import Interval, ModelFile, Segment, kinds_of
-from dynakin.model.state_priors import inertia_covariance, places_prior, state_bounds, state_prior
+from dynakin.model.state_priors import JointPrior, inertia_covariance, places_prior, state_bounds, state_prior
 from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
@@ -87,7 +87,7 @@ class ModelPlan:
             priors, self.worn_kg(priors),
         )  # fmt: skip
         if (together := self.joint_prior(priors)) is not None:
-            sd |= dict(zip(together[0], np.sqrt(np.diag(together[1])).tolist(), strict=True))
+            sd |= together.sd
         return sd
 
     def worn_kg(self, priors: Priors) -> float:
@@ -95,8 +95,8 @@ class ModelPlan:
         total = sum(body.mass for body in self.inertia.values())
         return priors.worn_mass_sd_fraction * total if self.model.sided else 0.0
 
-    def joint_prior(self, priors: Priors) -> tuple[tuple[str, ...], Array] | None:
-        """Names and covariance of what is known together of models in space: the inertia of a segment, all of which
+    def joint_prior(self, priors: Priors) -> JointPrior | None:
+        """What is known together of models in space: the inertia of a segment, all of which
         changes with what it weighs more, and the places of its markers, which were measured side by side."""
         if not self.model.sided:
             return None
@@ -104,8 +104,8 @@ class ModelPlan:
         names = [f"inertia/{name}/{each}" for name in self.inertia for each in INERTIA_NAMES]
         blocks = [inertia_covariance(body, self.reach[name], priors, worn_kg) for name, body in self.inertia.items()]
         places = {site.name: site.position for site in self.sites}
-        on, together = places_prior(places, {site.name: site.segment for site in self.sites}, priors)
-        return (*names, *on), block_diag(*blocks, *together)
+        placed = places_prior(places, {site.name: site.segment for site in self.sites}, priors)
+        return JointPrior(tuple(names), block_diag(*blocks)).with_known(placed)
 
     def bounds(self, bounds: Bounds, priors: Priors | None = None) -> dict[str, Interval]:
         """Bounds of (9) by the core's names; speeds and accelerations have none."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from dynakin.model.inertia import INERTIA_NAMES, RigidBody
 from dynakin.model.schema import Interval
@@ -17,6 +19,26 @@ _SDS = 4.0
 """Half width of the bounds of what has a standard deviation of its own: the +-20 % of a length are as much of its."""
 _POSITIVE = frozenset({"mass", "ixx", "iyy", "izz"})
 _LEAST_SHARE = 0.1  # of the table's value: a segment is not left without mass
+
+
+@dataclass(frozen=True, eq=False)
+class JointPrior:
+    """Prior covariance (k, k) of elements of the state that are known together, by name; how well each is known by
+    itself is ``CalibratedModel.sd0``."""
+
+    names: tuple[str, ...]
+    covariance: Array
+
+    @property
+    def sd(self) -> dict[str, float]:
+        """Standard deviation of each by itself."""
+        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    def with_known(self, other: JointPrior) -> JointPrior:
+        """With what is known otherwise of some of the elements, or of others."""
+        kept = [k for k, name in enumerate(self.names) if name not in other.names]
+        names = (*(self.names[k] for k in kept), *other.names)
+        return JointPrior(names, block_diag(self.covariance[np.ix_(kept, kept)], other.covariance))
 
 
 def state_prior(
@@ -91,18 +113,15 @@ def inertia_covariance(body: RigidBody, length: float, priors: Priors, worn_kg: 
     return np.asarray(np.diag(sd**2) + worn_kg**2 * np.outer(per_kg, per_kg))
 
 
-def places_prior(
-    places: Mapping[str, Array], segment_of: Mapping[str, str], priors: Priors
-) -> tuple[list[str], list[Array]]:
-    """Of markers' places (3,) on their segments: the core's names of them, segment by segment, and the prior covariance
-    of each segment's (`cluster_covariance`)."""
+def places_prior(places: Mapping[str, Array], segment_of: Mapping[str, str], priors: Priors) -> JointPrior:
+    """Of markers' places (3,) on their segments: those of a segment together (`cluster_covariance`)."""
     names: list[str] = []
     blocks: list[Array] = []
     for segment in dict.fromkeys(segment_of.values()):
         own = [name for name in places if segment_of[name] == segment]
         names += [f"marker/{name}/{axis}" for name in own for axis in "xyz"]
         blocks.append(cluster_covariance(np.array([places[name] for name in own]), priors))
-    return names, blocks
+    return JointPrior(tuple(names), block_diag(*blocks))
 
 
 def cluster_covariance(places: Array, priors: Priors) -> Array:

@@ -32,7 +32,10 @@ def find_forward(recording: Recording, up: Array, pairs: FacingPairs) -> tuple[A
     Raises:
         RecordingError: no foot or pelvis pair, no pair of sides, and the person does not walk.
     """
-    known, way = _forward_witnesses(recording, up, pairs)
+    walk, way = _walking(recording, up)
+    known = _forward_by_body(recording, up, pairs)
+    if walk is not None:
+        known.append((f"the walking direction ({way:.2g} m)", walk))
     if not known:
         raise RecordingError(
             f"{recording.path or recording.name}: facing direction not found "
@@ -52,7 +55,7 @@ def find_forward(recording: Recording, up: Array, pairs: FacingPairs) -> tuple[A
 def against_forward(recording: Recording, up: Array, given: Array, pairs: FacingPairs) -> tuple[str, bool]:
     """How the body contradicts a forward direction that is given, "" where it does not; and whether feet and pelvis, or
     the like, agree on that. Where the person walks is no witness: one may walk backwards."""
-    known = [(why, one) for why, one in _forward_witnesses(recording, up, pairs)[0] if not why.startswith(_WALKING)]
+    known = _forward_by_body(recording, up, pairs)
     if not known or any(_apart_deg(given, direction) <= _CONTRADICTS_DEG for _, direction in known):
         return "", False
     why, found = known[0]
@@ -65,22 +68,20 @@ def _apart_deg(one: Array, other: Array) -> float:
     return float(np.degrees(np.arccos(np.clip(one @ other, -1, 1))))
 
 
-def _forward_witnesses(recording: Recording, up: Array, pairs: FacingPairs) -> tuple[list[tuple[str, Array]], float]:
-    """What shows where the person faces, the surest first, and how far (m) the person walks."""
+def _forward_by_body(recording: Recording, up: Array, pairs: FacingPairs) -> list[tuple[str, Array]]:
+    """What of the body shows where the person faces, and that direction; the surest first."""
     frames = _window(recording)
     feet, n_feet = _mean_direction(recording, pairs.heel_toe, up, frames)
     pelvis, n_sides = _mean_direction(recording, pairs.pelvis, up, frames)
     leftward, _ = _mean_direction(recording, pairs.across, up, frames)
-    walk, way = _walking(recording, up)
     found = [
         ("from heel to toe (both feet)", feet if n_feet > 1 else None),
         ("from the back of the pelvis to its front", pelvis if n_sides > 1 else None),
         ("square to the line from right to left", None if leftward is None else np.cross(leftward, up)),
         ("from heel to toe (one foot only)", feet if n_feet == 1 else None),
         ("from the back of the pelvis to its front (one side only)", pelvis if n_sides == 1 else None),
-        (f"{_WALKING} ({way:.2g} m)", walk),
     ]
-    return [(why, direction) for why, direction in found if direction is not None], way
+    return [(why, direction) for why, direction in found if direction is not None]
 
 
 def horizontal(direction: Array, up: Array) -> Array | None:
@@ -133,7 +134,6 @@ def _walking(recording: Recording, up: Array) -> tuple[Array | None, float]:
     return (way / length if length >= WALKS_M else None), length
 
 
-_WALKING = "the walking direction"
 _CONTRADICTS_DEG = 60.0
 """Between a forward direction that is given and what each part of the body shows: an axis of the laboratory is given
 for who faces it within 45 deg."""

@@ -82,13 +82,15 @@ def read(
         raise RecordingError(
             f"{path}: found extension {path.suffix!r}, expected a recording as {extensions(READERS)}{hint}"
         )
-    recording = reader(path, options)
+    recording = marked = reader(path, options)
     _check_unit(recording, path)
-    if forces is not None:
-        recording = attach_forces(recording, read_forces(Path(forces)), options)
+    table = None if forces is None else read_forces(Path(forces))
+    if table is not None:
+        recording = attach_forces(marked, table, options)
     if plate_filter_hz is not None and not causal and recording.plates:  # what looks back delays, too, which is said
-        raw = read(path, forces, force_threshold_n=force_threshold_n)
-        if (cut := cuts_into_loads(raw, recording, plate_filter_hz)) is not None:
+        unfiltered = replace(options, plate_filter_hz=None)
+        raw = reader(path, unfiltered) if table is None else attach_forces(marked, table, unfiltered)
+        if (cut := cuts_into_loads(without_dead_channels(raw), recording, plate_filter_hz)) is not None:
             recording = replace(recording, notes=(*recording.notes, cut))
     asked = {
         "forces": None if forces is None else str(Path(forces).absolute()),

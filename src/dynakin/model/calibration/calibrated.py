@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import block_diag
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
@@ -16,6 +15,7 @@ from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.plan import ModelPlan
 from dynakin.model.spec import in_layout
+from dynakin.model.state_priors import JointPrior
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import level_pressure
 from dynakin.recordings.plates.pressure import LOADED_N
@@ -29,26 +29,6 @@ UNMARKED_SHARE = 0.09
 HEAVY_KG_M2 = 32.0
 """Body mass index beyond which a belly counts. The tables' persons have 20 to 28; 25 kg more on the trunk of somebody
 of 1.70 m (34 kg/m2) moved L5/S1 by 25 N m in simulated walks, and 30 kg/m2 is short persons of any build as well."""
-
-
-@dataclass(frozen=True, eq=False)
-class JointPrior:
-    """Prior covariance (k, k) of elements of the state that are known together, by name; how well each is known by
-    itself is ``CalibratedModel.sd0``."""
-
-    names: tuple[str, ...]
-    covariance: Array
-
-    @property
-    def sd(self) -> dict[str, float]:
-        """Standard deviation of each by itself."""
-        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-
-    def with_known(self, other: JointPrior) -> JointPrior:
-        """With what is known otherwise of some of the elements, or of others."""
-        kept = [k for k, name in enumerate(self.names) if name not in other.names]
-        names = (*(self.names[k] for k in kept), *other.names)
-        return JointPrior(names, block_diag(self.covariance[np.ix_(kept, kept)], other.covariance))
 
 
 @dataclass(frozen=True, eq=False)

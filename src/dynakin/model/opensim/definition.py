@@ -8,12 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.messages import note
-from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior, first_centre_of_pressure, starting_state
+from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure, starting_state
 from dynakin.model.calibration.pose_start import start_posture
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.opensim.calibrate import (
@@ -198,8 +197,7 @@ class OpenSimDefinition:
         skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
         kinds, known = kinds_of(spec.segments), priors or Priors()
         known = known.changed(marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
-        names, blocks = places_prior(places, {marker.name: marker.body for marker, _ in chosen}, known)
-        together = JointPrior(tuple(names), block_diag(*blocks))
+        together = places_prior(places, {marker.name: marker.body for marker, _ in chosen}, known)
         state, said = starting_state(
             spec,
             bounds=state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds()),

@@ -111,12 +111,16 @@ def foot_contacts(
     body = _middle_velocity(velocity)
     floor = floor_height(recording, ground)
     seen = foot_places(recording, ground, markers)
+    flats = [np.nanpercentile(places[:, :, 1], 5.0, axis=0) for _, places in seen.values()]  # (K,) m, standing flat
     with np.errstate(invalid="ignore"):
-        low = [(velocity[:, columns], _rise(places) < NEAR_SUPPORT_M) for columns, places in seen.values()]
+        low = [
+            (velocity[:, columns], places[:, :, 1] - flat < NEAR_SUPPORT_M)
+            for (columns, places), flat in zip(seen.values(), flats, strict=True)
+        ]
     belts = belt_velocities(low, body, recording.time)
     feet = {
-        foot: _Foot(places, velocity[:, columns], belt, recording, floor, plates)
-        for (foot, (columns, places)), belt in zip(seen.items(), belts, strict=True)
+        foot: _Foot(places, flat, velocity[:, columns], belt, recording, floor, plates)
+        for (foot, (columns, places)), flat, belt in zip(seen.items(), flats, belts, strict=True)
     }
     _settle(list(feet.values()))
     return {name: foot.contact() for name, foot in feet.items()}
@@ -162,22 +166,13 @@ def _middle_velocity(velocity: Array) -> Array:
     return found
 
 
-def _flat(places: Array) -> Array:
-    """(K,) heights of a foot's markers (T, K, 3), standing flat."""
-    return np.asarray(np.nanpercentile(places[:, :, 1], 5.0, axis=0))
-
-
-def _rise(places: Array) -> Array:
-    """(T, K) how far they are above that."""
-    return np.asarray(places[:, :, 1] - _flat(places))
-
-
 class _Foot:
     """One foot while its contact is worked out."""
 
     def __init__(
         self,
         places: Array,
+        flat: Array,
         velocity: Array,
         belt: Array,
         recording: Recording,
@@ -187,8 +182,8 @@ class _Foot:
         self.places, self.plates, self.floor_m = places, plates, floor_m
         self.rate, n = recording.rate, recording.n_frames
         self.frames = (lambda seconds: max(1, round(seconds * self.rate))) if n > 1 else (lambda seconds: 1)
-        self.flat, self.belt = _flat(places), belt
-        self.rise = _rise(places)
+        self.flat, self.belt = flat, belt  # (K,) heights of the markers, standing flat
+        self.rise = places[:, :, 1] - flat
         with np.errstate(invalid="ignore"):
             against = velocity - np.stack([self.belt[:, 0], np.zeros(n), self.belt[:, 1]], axis=1)[:, None]
             self.speed = np.linalg.norm(against, axis=2)

@@ -88,7 +88,7 @@ def read_plates(
         ]
     step = (time[1] - time[0]) / per_frame if len(time) > 1 else 1.0
     analog_time = np.arange(analog.shape[1]) * step + time[0]
-    raws, notes = [], []
+    raws, numbers, notes = [], list[int](), []
     for k in range(int(used)):
         name = f"plate {k + 1}"
         try:
@@ -99,8 +99,9 @@ def read_plates(
             notes.append(warning("plates", f"{name} left out: {why}."))
             continue
         raws.append(raw)
+        numbers.append(k)
         notes += said
-    notes += shared_channels(parameters, [raw.name for raw in raws])
+    notes += shared_channels(parameters, numbers)
     turned = pulling([raw.force @ raw.surface.normal for raw in raws])
     notes += turned_in_words([raw.name for raw in raws], turned)
     raws = [
@@ -211,13 +212,13 @@ def _channels(parameters: Parameters, k: int, wanted: int, count: int) -> list[i
     return [int(number) - 1 for number in numbers]
 
 
-def shared_channels(parameters: Parameters, names: Sequence[str]) -> list[Message]:
-    """Warnings of plates that list a channel of a plate before them: it is not both plates'."""
+def shared_channels(parameters: Parameters, plates: Sequence[int]) -> list[Message]:
+    """Warnings of those plates (from 0) that list a channel of one before them: it is not both plates'."""
     listed = parameters.array("FORCE_PLATFORM", "CHANNEL")
     types = parameters.array("FORCE_PLATFORM", "TYPE").ravel()
     found, owners = list[Message](), dict[float, str]()
-    for name in names:
-        k = int(name.split()[1]) - 1
+    for k in plates:
+        name = f"plate {k + 1}"
         own = listed.reshape(listed.shape[0], -1)[: TYPES[int(types[k])].channels, k].tolist()
         if shared := [channel for channel in own if channel in owners]:
             numbers = ", ".join(f"{channel:g}" for channel in shared)

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.recordings.recording import Array
 
-_MOVES_M_S = 0.1
+MOVES_M_S = 0.1
 """Speed, median over the markers, from which the person moves."""
 _ROUNDED = 4.0
 """Of the file's smallest steps of a marker: by more no line bends that was drawn over a gap. Feet on a moving belt, raw
@@ -41,7 +41,7 @@ def repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
     step = np.concatenate([[np.inf], middle])  # of half of the markers: of one it may be a rounded digit
     still = both.any(axis=1) & (seen[1:] == seen[:-1]).all(axis=1) & (np.where(both, steps, 0.0) == 0.0).all(axis=1)
     same = np.concatenate([[False], still])
-    least = max(_MOVES_M_S / rate, _ROUNDED * _smallest_step(markers))
+    least = max(MOVES_M_S / rate, _ROUNDED * _smallest_step(markers))
     found = np.zeros(len(markers), dtype=bool)
     for first, end in runs(same):
         found[first:end] = first > 1 and end < len(step) and min(step[first - 1], step[end]) > least
@@ -56,15 +56,15 @@ def straight(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
     bend = np.linalg.norm(np.diff(markers, n=2, axis=0), axis=2)
     step = np.linalg.norm(np.diff(markers, axis=0), axis=2)
     for m in range(markers.shape[1]):
-        moving = bend[(step[1:, m] * rate > _MOVES_M_S) & np.isfinite(bend[:, m]), m]
+        moving = bend[(step[1:, m] * rate > MOVES_M_S) & np.isfinite(bend[:, m]), m]
         if len(moving) < _LINE_FRAMES:
             continue
         tick = max(_smallest_step(markers[:, m]), _FINEST_M)
         if not float(np.median(moving)) > _FINE * tick:
             continue
         with np.errstate(invalid="ignore"):
-            straight = bend[:, m] <= _ROUNDED * tick
-        for first, end in runs(straight):
+            unbent = bend[:, m] <= _ROUNDED * tick
+        for first, end in runs(unbent):
             ends = bend[[k for k in (first - 1, end) if 0 <= k < len(bend)], m]
             kinks = bool(np.nanmax(ends, initial=0.0) > _KINK * tick)
             length = float(np.linalg.norm(markers[end + 1, m] - markers[first, m]))

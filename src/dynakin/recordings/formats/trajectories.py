@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dynakin.arrays import by_neighbours
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
-from dynakin.recordings.formats.filled import held, repeated, straight
+from dynakin.recordings.formats.filled import MOVES_M_S, held, repeated, straight
 from dynakin.recordings.formats.jumps import without_jumps
 from dynakin.recordings.recording import Array
 from dynakin.recordings.times import rate_of, step_of
@@ -23,8 +23,6 @@ _METRES_BELOW, _CENTIMETRES_BELOW = 5.0, 300.0
 0.3 m. Only a foot in mm (300) and a person with arms raised in cm (260) come near each other."""
 _SAME_M = 3e-3
 """Distance up to which two trajectories are one marker's, rounded or filtered otherwise: balls of 6 mm touch there."""
-_MOVES_M_S = 0.1
-"""Speed, median over the markers, from which the person moves."""
 _MOST_REPEATED = 0.2
 """Part of the frames that may repeat others: more is another rate, written as this one."""
 _EVEN = 0.2
@@ -263,7 +261,7 @@ def _left_out(markers: Array, time: Array) -> list[Message]:
     size = np.square(expected).sum(axis=(1, 2))
     times = (found * expected).sum(axis=(1, 2)) / np.maximum(size, 1e-12)
     apart = np.sqrt(np.square(found - times[:, None, None] * expected).sum(axis=(1, 2)) / np.maximum(size, 1e-12))
-    moves = np.sqrt(size / seen) > _MOVES_M_S
+    moves = np.sqrt(size / seen) > MOVES_M_S
     jumps = np.flatnonzero(even & moves & (seen >= _ENOUGH) & (times > _TWICE) & (apart < _ALL_ALIKE * times))
     if not len(jumps):
         return []

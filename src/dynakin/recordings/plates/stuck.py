@@ -71,16 +71,20 @@ def frozen_in_words(name: str, time: Array, lost: Flags) -> list[Message]:
     """A warning of a plate some of whose rows (N,) are frozen."""
     if not lost.any():
         return []
-    spans = [f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(lost)]
-    more = f" and {len(spans) - 3} more times" if len(spans) > 3 else ""
     return [
         warning(
             "plates",
-            f"{name} repeats one and the same row while somebody stands on it, from {', '.join(spans[:3])}{more}, "
+            f"{name} repeats one and the same row while somebody stands on it, from {_when(time, runs(lost))}, "
             "though its load moved before or jumps after: not measured there. Export the forces again, or look whether "
             "their recording was interrupted.",
         )
     ]
+
+
+def _when(time: Array, spans: Sequence[tuple[int, int]]) -> str:
+    """When frames [first, end) of these stretches are, the first three of them."""
+    more = f" and {len(spans) - 3} more times" if len(spans) > 3 else ""
+    return ", ".join(f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in spans[:3]) + more
 
 
 @dataclass(frozen=True)
@@ -143,14 +147,11 @@ def _dead_in_words(
     if cop.any():
         axes = " and ".join("XYZ"[axis] for k, axis in enumerate(level) if cop[:, k].any())
         what.append(f"its centre of pressure along {axes}")
-    time = recording.time
-    times = ", ".join(f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in spans[:3])
-    more = f" and {len(spans) - 3} more times" if len(spans) > 3 else ""
     return warning(
         "plates",
         f"{name}: {' and '.join(what)} never change{'s' if len(what) == 1 else ''} while the load on it does, from "
-        f"{times}{more}: a channel is dead or was not exported. Not measured there; look at its channels in "
-        f"{recording.plates_file}.",
+        f"{_when(recording.time, spans)}: a channel is dead or was not exported. Not measured there; look "
+        f"at its channels in {recording.plates_file}.",
     )
 
 

@@ -67,8 +67,8 @@ def compared_stances(estimate: Estimate, window: Flags) -> dict[str, list[slice]
 
 def counted(estimate: Estimate, window: Flags) -> Flags:
     """(T, C) frames in which a moment counts: all of the window where it is measured throughout; of a leg else the
-    stances and swings that are whole and measured in every frame, if there is a stance among
-    them; of anything else none."""
+    stances and swings that are whole and measured in every frame, if there is a stance among them; of anything else
+    none."""
     measured = sources.moment_sources(estimate.data) == sources.MEASURED
     found = np.zeros(measured.shape, dtype=bool)
     found[window] = measured[window].all(axis=0)
