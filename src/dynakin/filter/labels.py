@@ -27,6 +27,10 @@ def labels(
         "time": time,
         "coordinate": model.coordinate_names,
         "coordinate_type": ("coordinate", [kinds[c.name] for c in spec.coordinates]),
+        "coordinate_file_unit": (
+            "coordinate",
+            [_file_unit(initial, c.name, kinds[c.name]) for c in spec.coordinates],
+        ),
         "coordinate_segment": ("coordinate", moved_segments(spec)),
         "marker": list(initial.recorded_markers),
         "axis": list(AXES),
@@ -45,6 +49,10 @@ def labels(
         found |= {
             "coupled_coordinate": list(initial.coupled.kinds),
             "coupled_coordinate_type": ("coupled_coordinate", [kind for kind, _ in kinds_and_hosts]),
+            "coupled_coordinate_file_unit": (
+                "coupled_coordinate",
+                [_file_unit(initial, name, kind) for name, (kind, _) in initial.coupled.kinds.items()],
+            ),
             "coupled_coordinate_follows": ("coupled_coordinate", [host for _, host in kinds_and_hosts]),
         }
     if feet is not None:
@@ -54,6 +62,11 @@ def labels(
             "foot_declared": ("foot", np.array([name in initial.contacts for name in feet.names], dtype=bool)),
         }
     return found
+
+
+def _file_unit(initial: CalibratedModel, name: str, kind: str) -> str:
+    """Unit of a coordinate in the tables that OpenSim reads."""
+    return "m" if kind == "translation" else "rad" if name in initial.in_radians else "deg"
 
 
 def _joints(spec: _core.ModelSpec) -> tuple[list[str], list[int], list[str]]:

@@ -110,6 +110,7 @@ def make_spatial(duration_s: float = 6.0, *, walk_m: float = 0.0) -> Estimate:
     data = data.assign_coords(
         coordinate=list(COORDINATES),
         coordinate_type=("coordinate", ["translation" if name.endswith("tx") else "rotation" for name in COORDINATES]),
+        coordinate_file_unit=("coordinate", ["m" if name.endswith("tx") else "deg" for name in COORDINATES]),
         coordinate_segment=("coordinate", list(COORDINATES.values())),
         marker_axes_modelled=("axis", [True, True, True]),
         joint=list(SEGMENTS),

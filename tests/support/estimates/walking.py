@@ -108,6 +108,7 @@ def make_walker(withheld: tuple[int, ...] = (), *, code: int = DERIVED) -> Estim
     data = data.assign_coords(
         coordinate=list(COORDINATES),
         coordinate_type=("coordinate", ["translation"] + 4 * ["rotation"]),
+        coordinate_file_unit=("coordinate", ["m"] + 4 * ["deg"]),
         coordinate_segment=("coordinate", list(COORDINATES.values())),
         marker_axes_modelled=("axis", [True, True, True]),
         joint=list(SEGMENTS),

@@ -108,6 +108,7 @@ class CalibratedModel(StartingState):
             inwards.
         joint_prior: how elements hang together at first; the others are independent.
         coupled: coordinates of an OpenSim model that follow others, and are none of ``spec``.
+        in_radians: rotations, of ``coupled`` too, that OpenSim takes from a table in degrees as radians all the same.
     """
 
     spec: _core.ModelSpec
@@ -138,6 +139,7 @@ class CalibratedModel(StartingState):
     joint_prior: JointPrior | None = None
     contacts: dict[str, str] = field(default_factory=dict)
     coupled: Coupled | None = None
+    in_radians: frozenset[str] = frozenset()
 
     @property
     def heavy(self) -> bool:

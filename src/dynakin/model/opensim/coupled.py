@@ -1,4 +1,5 @@
-"""Values of the coordinates that couplers drive, which are no states: the model is posed by all of them."""
+"""Values of the coordinates that couplers drive, which are no states: the model is posed by all of them; and which of all
+coordinates OpenSim calls coupled, which is something else."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ import numpy.typing as npt
 from dynakin.model.calibration.calibrated import Coupled
 from dynakin.model.opensim.chains import resolved
 from dynakin.model.opensim.description import GROUND, ZERO, Body, Coordinate, Joint, JointAxis, Offset, OpenSimModel
+from dynakin.model.opensim.functions import is_as_steep
 from dynakin.model.opensim.joints import X
 from dynakin.model.opensim.spec import to_spec
 from dynakin.model.schema import kinds_of
@@ -32,6 +34,14 @@ def coupled_of(source: OpenSimModel) -> Coupled | None:
     spec = to_spec(replace(source, bodies=bodies, joints=sliders, markers=()), {}, markers=[])
     kinds = kinds_of(source.joints)
     return Coupled(spec, {name: (kinds[name], host) for name, host in hosts.items()})
+
+
+def in_radians(source: OpenSimModel) -> frozenset[str]:
+    """Rotations that are radians in any table that OpenSim reads or writes, also where its header says ``inDegrees=yes``
+    (motion type *Coupled*): those that turn nothing by themselves, but by a function of another slope than 1 or -1."""
+    axes = [axis for joint in source.joints for axis in joint.axes if axis.kind == "rotation"]
+    plain = {axis.coordinate for axis in axes if is_as_steep(axis.functions)}
+    return frozenset(axis.coordinate for axis in axes if axis.coordinate is not None) - plain
 
 
 def _along(name: str) -> JointAxis:

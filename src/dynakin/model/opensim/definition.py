@@ -26,7 +26,7 @@ from dynakin.model.opensim.calibrate import (
     reach_of,
     refuse_too_few,
 )
-from dynakin.model.opensim.coupled import coupled_of
+from dynakin.model.opensim.coupled import coupled_of, in_radians
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.feet import feet_of
 from dynakin.model.opensim.person import person_of
@@ -228,6 +228,7 @@ class OpenSimDefinition:
             unmarked_kg=sum(bodies[name].mass for name in moved_by(source, lock)),
             held=dict.fromkeys(lock, "it moves no measured marker"),
             coupled=coupled_of(source),
+            in_radians=in_radians(source),
             joint_prior=None if kept else together,
         )
 

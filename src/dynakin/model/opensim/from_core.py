@@ -7,14 +7,15 @@ body between. A coordinate belongs to the first joint that it moves; elsewhere a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from dynakin.bindings import _core
+from dynakin.model.calibration.posture import turned
 from dynakin.model.inertia import INERTIA_NAMES, RigidBody
 from dynakin.model.opensim.description import (
     Body,
@@ -27,8 +28,12 @@ from dynakin.model.opensim.description import (
     OpenSimModel,
     Vector,
 )
-from dynakin.model.opensim.functions import IDENTITY, Function, is_constant, joined, polynomial
-from dynakin.model.schema import Interval
+from dynakin.model.opensim.functions import IDENTITY, Chain, Function, constant, is_constant, joined, polynomial
+from dynakin.model.schema import Interval, Kind
+
+Array = npt.NDArray[np.float64]
+
+_APART = 1e-6  # sine of the angle between two axes
 
 
 def from_core(
@@ -64,6 +69,45 @@ def _vector(numbers: object) -> Vector:
     return float(x), float(y), float(z)
 
 
+@dataclass(frozen=True, eq=False)
+class _Moving:
+    """An axis of a chain with its functions, whose last holds the length that it grows with."""
+
+    kind: Kind
+    direction: Array
+    coordinate: str
+    functions: Chain
+
+
+@dataclass(eq=False)
+class _Run:
+    """Axes of one joint, after a turn and a place that no coordinate changes."""
+
+    turn: Array = field(default_factory=lambda: np.eye(3))
+    place: Array = field(default_factory=lambda: np.zeros(3))
+    moving: list[_Moving] = field(default_factory=list)
+
+    def takes(self, axis: _Moving, fixed: bool) -> bool:
+        """Whether the axis may follow in the same joint."""
+        if any(entry.kind == "rotation" for entry in self.moving) and (fixed or axis.kind == "translation"):
+            return False
+        alike = [entry.direction for entry in self.moving if entry.kind == axis.kind]
+        apart = all(np.linalg.norm(np.cross(axis.direction, other)) >= _APART for other in alike)
+        return fixed or (len(alike) < 3 and apart)
+
+    def add(self, axis: _Moving, fixed: bool) -> None:
+        """Put the axis last. Nothing turns before one that is fixed, so that translations before it may follow it, in
+        its frame."""
+        if not fixed:
+            self.moving.append(axis)
+        elif axis.kind == "translation":
+            self.place = self.place + self.turn @ axis.direction * constant(axis.functions)
+        else:
+            turn = turned(constant(axis.functions) * axis.direction)
+            self.turn = self.turn @ turn
+            self.moving = [replace(entry, direction=turn.T @ entry.direction) for entry in self.moving]
+
+
 @dataclass
 class _Tree:
     spec: _core.ModelSpec
@@ -83,31 +127,49 @@ class _Tree:
         place = np.array(segment.translation)
         for term in segment.lengths:
             place = place + self.length(term.parameter) * np.array(term.direction)
-        x, y, z = scipy.spatial.transform.Rotation.from_matrix(segment.rotation).as_euler("XYZ")
-        offset, parent = Offset(_vector(place), (float(x), float(y), float(z))), segment.parent
-        groups = _groups(segment.axes)
-        for k, group in enumerate(groups):
-            last = k == len(groups) - 1
+        parent, turn = segment.parent, np.array(segment.rotation)
+        runs = self._runs(segment.axes)
+        for k, run in enumerate(runs):
+            last = k == len(runs) - 1
             child = segment.name if last else f"{segment.name}_{k + 1}"
-            self.joints.append(self._joint(f"{child}_joint", parent, offset, child, group))
+            x, y, z = scipy.spatial.transform.Rotation.from_matrix(turn @ run.turn).as_euler("XYZ")
+            offset = Offset(_vector(place + turn @ run.place), (float(x), float(y), float(z)))
+            self.joints.append(self._joint(f"{child}_joint", parent, offset, child, run.moving))
             self.bodies.append(self._body(segment) if last else Body.of(child, RigidBody.nothing()))
-            parent, offset = child, Offset()
+            parent, place, turn = child, np.zeros(3), np.eye(3)
+
+    def _runs(self, axes: list[_core.AxisSpec]) -> list[_Run]:
+        """Of at most three translations and then at most three rotations, no two along one line, which OpenSim
+        refuses; one empty run for a weld.
+
+        What turns by a constant is part of where a joint lies: OpenSim's velocities are wrong where a rotation that
+        moves follows one that does not (4.6).
+        """
+        runs = [_Run()]
+        for axis in axes:
+            moving = _Moving(_kind(axis), np.array(axis.direction), axis.coordinate, self._functions(axis))
+            fixed = is_constant(moving.functions)
+            if fixed and constant(moving.functions) == 0.0:
+                continue
+            if not runs[-1].takes(moving, fixed):
+                runs.append(_Run())
+            runs[-1].add(moving, fixed)
+        return runs
 
     def _body(self, segment: _core.SegmentSpec) -> Body:
         names = [f"inertia/{segment.name}/{name}" for name in INERTIA_NAMES]
         numbers = [self.values.get(name, value) for name, value in zip(names, segment.inertia, strict=True)]
         return Body.of(segment.name, RigidBody.from_vector(numbers))
 
-    def _joint(self, name: str, parent: str, offset: Offset, child: str, group: list[_core.AxisSpec]) -> Joint:
+    def _joint(self, name: str, parent: str, offset: Offset, child: str, moving: list[_Moving]) -> Joint:
         own: dict[str, Coordinate] = {}
         axes = []
-        for axis in group:
-            functions = self._functions(axis)
-            coordinate = None if is_constant(functions) else self._coordinate(axis.coordinate, child, own)
-            axes.append(JointAxis(_kind(axis), _vector(axis.direction), coordinate, functions))
+        for axis in moving:
+            coordinate = self._coordinate(axis.coordinate, child, own)
+            axes.append(JointAxis(axis.kind, _vector(axis.direction), coordinate, axis.functions))
         return Joint(
             name,
-            "CustomJoint" if group else "WeldJoint",
+            "CustomJoint" if moving else "WeldJoint",
             parent,
             offset,
             child,
@@ -138,19 +200,5 @@ class _Tree:
         return here
 
 
-def _kind(axis: _core.AxisSpec) -> Literal["rotation", "translation"]:
+def _kind(axis: _core.AxisSpec) -> Kind:
     return "rotation" if axis.kind == "rotation" else "translation"
-
-
-def _groups(axes: list[_core.AxisSpec]) -> list[list[_core.AxisSpec]]:
-    """Runs of at most three translations and then at most three rotations, no two along one line, which OpenSim
-    refuses; one empty run for a weld."""
-    groups: list[list[_core.AxisSpec]] = [[]]
-    for axis in axes:
-        kinds = [entry.kind for entry in groups[-1]]
-        alike = [entry.direction for entry in groups[-1] if entry.kind == axis.kind]
-        full = len(alike) == 3 or (axis.kind == "translation" and "rotation" in kinds)
-        if full or any(np.linalg.norm(np.cross(axis.direction, other)) < 1e-6 for other in alike):
-            groups.append([])
-        groups[-1].append(axis)
-    return groups

@@ -75,6 +75,11 @@ def is_linear(chain: Chain) -> bool:
     return all(f.kind == "polynomial" and len(f.coefficients) <= 2 for f in chain)
 
 
+def is_as_steep(chain: Chain) -> bool:
+    """Whether it is a straight line that rises, or falls, as much as its argument does."""
+    return is_linear(chain) and len(chain) <= 1 and all(f.coefficients[1:] in ((1.0,), (-1.0,)) for f in chain)
+
+
 def read_function(node: Node) -> Chain:
     """The chain of one of OpenSim's functions.
 

@@ -63,6 +63,9 @@ def _write_motion(estimate: Estimate, path: Path, title: str, variable: str, uni
     names = [name for name, own in zip(estimate.coordinate_names, seen, strict=True) if own]
     held = [name for name, own in zip(estimate.coordinate_names, seen, strict=True) if not own]
     notes = [units, _frame(estimate)]
+    radians = [*_in_radians(estimate, "coordinate"), *_in_radians(estimate, "coupled_coordinate")]
+    if radians:
+        notes.append(f"In radians, as OpenSim takes what moves its joint by a function alone: {', '.join(radians)}.")
     if held:
         notes.append(f"Left out, because no marker shows them: {', '.join(held)}.")
     values, digits = _in_degrees(estimate, variable)[:, seen], DIGITS_OF_RATES
@@ -83,9 +86,8 @@ def _coupled(estimate: Estimate) -> tuple[list[str], np.ndarray]:
         return [], np.empty((len(estimate.time), 0))
     data = estimate.data
     shown = ~np.isin(data["coupled_coordinate_follows"].values, list(estimate.held))
-    rotation = data["coupled_coordinate_type"].values == "rotation"
-    values = data["coupled_coordinates"].transpose("time", ...).values.astype(float, copy=True)
-    values[:, rotation] = np.degrees(values[:, rotation])
+    values = data["coupled_coordinates"].transpose("time", ...).values
+    values = _turned(values, data["coupled_coordinate_file_unit"].values)
     return [str(name) for name in data["coupled_coordinate"].values[shown]], values[:, shown]
 
 
@@ -203,7 +205,16 @@ def _frame(estimate: Estimate) -> str:
 
 
 def _in_degrees(estimate: Estimate, variable: str) -> np.ndarray:
-    values = estimate.values(variable).astype(float, copy=True)
-    rotation = estimate.is_rotation()
-    values[:, rotation] = np.degrees(values[:, rotation])
-    return values
+    return _turned(estimate.values(variable), estimate.data["coordinate_file_unit"].values)
+
+
+def _in_radians(estimate: Estimate, dimension: str) -> list[str]:
+    if dimension not in estimate.data.coords:
+        return []
+    units = estimate.data[f"{dimension}_file_unit"].values
+    return [str(name) for name in estimate.data[dimension].values[units == "rad"]]
+
+
+def _turned(values: np.ndarray, units: np.ndarray) -> np.ndarray:
+    """(T, N) of radians and metres in these units (N,) of a table."""
+    return np.asarray(np.where(units == "deg", np.degrees(values), values), dtype=float)
