@@ -70,6 +70,16 @@ def test_prefix_and_blanks_in_names_stay(tmp_path: Path) -> None:
     assert recording.marker_names == ("S1:R knee", "S1:R.ANK")
 
 
+def test_what_a_model_computed_is_no_marker(tmp_path: Path) -> None:
+    """Exporters write every point of a C3D; a moment that changes fast passed for a marker that jumps."""
+    recording = read(write(tmp_path, "a.trc", TRC.replace("RKNE", "S1:RKneeMoment")))
+    assert recording.marker_names == ("RANK",)
+    assert "1 computed points left out: S1:RKneeMoment." in [str(message) for message in recording.notes]
+    nothing = TRC.replace("RKNE", "*52").replace("RANK", "LHipAngles")
+    with pytest.raises(RecordingError, match="found 2 points and no marker"):
+        read(write(tmp_path, "b.trc", nothing))
+
+
 def test_missing_unit_is_found_and_said(tmp_path: Path) -> None:
     text = TRC.replace("\tUnits", "\t").replace("\tmm\t", "\t\t").replace("4.5\t5.5", "904.5\t5.5")
     recording = read(write(tmp_path, "a.trc", text))

@@ -16,7 +16,6 @@ from dynakin.results.files.motion import write_coordinates
 from support.osim.files import COUPLER, small_model
 from support.osim.states import coupled, random_motion
 
-
 LINE_OF_U = "<coefficients>0.8 0.1</coefficients>"
 
 

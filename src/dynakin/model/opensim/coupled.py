@@ -1,5 +1,5 @@
-"""Values of the coordinates that couplers drive, which are no states: the model is posed by all of them; and which of all
-coordinates OpenSim calls coupled, which is something else."""
+"""Values of the coordinates that couplers drive, which are no states: the model is posed by all of them. And those of
+which OpenSim says *Coupled*, which is something else."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def coupled_of(source: OpenSimModel) -> Coupled | None:
 
 
 def in_radians(source: OpenSimModel) -> frozenset[str]:
-    """Rotations that are radians in any table that OpenSim reads or writes, also where its header says ``inDegrees=yes``
+    """Rotations that are radians in any table that OpenSim reads or writes, whatever its header says of degrees
     (motion type *Coupled*): those that turn nothing by themselves, but by a function of another slope than 1 or -1."""
     axes = [axis for joint in source.joints for axis in joint.axes if axis.kind == "rotation"]
     plain = {axis.coordinate for axis in axes if is_as_steep(axis.functions)}

@@ -13,10 +13,10 @@ from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plates import read_plates
-from dynakin.recordings.formats.c3d_points import Points, sort_points
 from dynakin.recordings.formats.c3d_records import Correction, check_c3d_file
 from dynakin.recordings.formats.c3d_signals import first_frame, read_analog, read_events
 from dynakin.recordings.formats.c3d_subject import read_subject
+from dynakin.recordings.formats.points import Points, sort_points
 from dynakin.recordings.formats.textfile import check_unique, trial_name
 from dynakin.recordings.formats.trajectories import clean_markers, distinct_names, length_unit
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
@@ -24,6 +24,8 @@ from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.resampling import ReadOptions
 
 _Read = TypeVar("_Read")
+_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
+"""POINT parameters that list what a model computed; others may be named by POINT:TYPE_GROUPS."""
 
 
 def read_c3d(path: Path, options: ReadOptions | None = None) -> Recording:
@@ -139,4 +141,13 @@ def _points(data: Any, parameters: Parameters) -> tuple[Array, Points]:
     points = np.asarray(data["data"]["points"], dtype=float)[:3].copy()
     residual = np.asarray(data["data"]["meta_points"]["residuals"], dtype=float)[0]  # (N, T)
     points[:, residual < 0] = np.nan
-    return points, sort_points(parameters, points)
+    labels = parameters.texts("POINT", "LABELS")[: points.shape[1]]
+    labels += [""] * (points.shape[1] - len(labels))
+    return points, sort_points(labels, points, _computed(parameters))
+
+
+def _computed(parameters: Parameters) -> set[str]:
+    """Labels that the file lists as a model's outputs."""
+    groups = [word.upper() for word in parameters.texts("POINT", "TYPE_GROUPS")[::2]]
+    keys = {*_COMPUTED, *groups} - {"MODELED_MARKERS", "MODELLED_MARKERS", "MARKERS", "LABELS"}
+    return {text for key in keys for text in parameters.texts("POINT", key) if text}

@@ -25,6 +25,7 @@ from dynakin.messages import Message
 from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table
+from dynakin.recordings.formats.points import sort_points
 from dynakin.recordings.formats.textfile import (
     check_unique,
     read_lines,
@@ -81,6 +82,8 @@ def read_csv(path: Path, options: ReadOptions | None = None) -> Recording:
     forces = [name for name in table.names if parse_column(name)]
     rest = [name for name in table.names if name not in forces]
     names, raw = _markers(table, rest)
+    found = sort_points(names, raw.transpose(2, 1, 0))
+    names, raw = found.names, raw[:, found.markers]
     time, stamp_notes = settled_times(table.time, raw)
     table = replace(table, time=time, notes=(*table.notes, *stamp_notes))
     factor, unit, unit_notes = (1.0, "m", []) if forces else _unit(raw)
@@ -92,7 +95,7 @@ def read_csv(path: Path, options: ReadOptions | None = None) -> Recording:
         marker_names=names,
         markers=markers,
         length_unit=unit,
-        notes=(*table.notes, *timing_notes(table.time), *unit_notes, *notes),
+        notes=(*table.notes, *found.notes, *timing_notes(table.time), *unit_notes, *notes),
     )
     if not forces:
         return recording

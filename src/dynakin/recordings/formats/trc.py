@@ -20,6 +20,7 @@ from pathlib import Path
 
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
+from dynakin.recordings.formats.points import sort_points
 from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows, trial_name
 from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.formats.trajectories import clean_markers, distinct_names, length_unit, timing_notes
@@ -52,11 +53,16 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
     empty = f"has no frames, expected rows of numbers after line {top + 1}"
     table, time, row_notes, time_notes = timed_rows(body, columns, path, empty=empty, time_at=1, rate=rate)
     raw = table[:, 2:].reshape(len(table), len(names), 3)
+    found = sort_points(names, raw.transpose(2, 1, 0))
+    if not found.names:
+        said = f"found {len(names)} points and no marker; expected labelled markers"
+        raise RecordingError(f"{path}, line {top + 1}: {said}")
+    raw = raw[:, found.markers]
     factor, unit, unit_notes = length_unit(header.get("units", ""), raw)
     time, stamp_notes = settled_times(time, raw, rate)
     time_notes += stamp_notes
     notes = row_notes + _count_notes(header, len(table), len(names)) + time_notes + timing_notes(time, rate)
-    names, markers, doubled_notes = distinct_names(names, raw * factor)
+    names, markers, doubled_notes = distinct_names(found.names, raw * factor)
     check_unique(names, "marker", path)
     markers, marker_notes = clean_markers(names, markers, time, path)
     return Recording(
@@ -66,7 +72,7 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
         marker_names=names,
         markers=markers,
         length_unit=unit,
-        notes=tuple(notes + unit_notes + doubled_notes + marker_notes),
+        notes=(*notes, *found.notes, *unit_notes, *doubled_notes, *marker_notes),
     )
 
 

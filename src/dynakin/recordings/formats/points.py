@@ -1,22 +1,19 @@
-"""Which points of a C3D file are markers, which a model's outputs."""
+"""Which points of a file are markers, which a model's outputs."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from dynakin.messages import Message, note
-from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.recording import Array
 
 _UNLABELLED = re.compile(r"^(\*\d*|_?(unlabell?ed|unidentified|unnamed|uname)\W*\d*)$", re.IGNORECASE)
-# POINT parameters that list what a model computed; others may be named by POINT:TYPE_GROUPS
-_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
-# What such outputs are called, where a program has dropped those lists: LHipAngles, RKneeMoment_1
+# What outputs are called, where no list names them: LHipAngles, RKneeMoment_1
 _OUTPUT = re.compile(r"[a-z0-9](Angles?|Forces?|Moments?|Powers?|GRF)(_\w+)?$")
 _CENTRE_OF_MASS = re.compile(
     r"^(cent(re|er)_?of_?(mass|gravity)(_?(floor|[xyz]))?|com(floor)?|cog|whole_?body_?com)$", re.I
@@ -42,16 +39,17 @@ class Points:
     unlabelled: int = 0
 
 
-def sort_points(parameters: Parameters, points: Array) -> Points:
+def sort_points(labels: Sequence[str], points: Array, listed: Collection[str] = ()) -> Points:
     """Sort the points (3, N, T), NaN where missing, into markers and what is none, with notes on the latter.
 
     Modelled markers (a knee's marker that a static trial gave, say) stay: nothing marks them off from measured ones.
+
+    Args:
+        labels: of the points. listed: those that the file itself says a model computed.
     """
     count = points.shape[1]
-    labels = parameters.texts("POINT", "LABELS")[:count]
-    labels += [""] * (count - len(labels))
     unlabelled = {k for k, label in enumerate(labels) if not label or _UNLABELLED.match(_plain(label))}
-    outputs = [k for k, label in enumerate(labels) if k not in unlabelled and _is_output(label, _listed(parameters))]
+    outputs = [k for k, label in enumerate(labels) if k not in unlabelled and _is_output(label, listed)]
     rest = [k for k in range(count) if k not in unlabelled and k not in set(outputs)]
     masses = [k for k in rest if _CENTRE_OF_MASS.match(_plain(labels[k]))]
     stems, axes = _axes([k for k in rest if k not in masses], labels, points)
@@ -81,13 +79,7 @@ def _plain(label: str) -> str:
     return label.rpartition(":")[2].strip()
 
 
-def _listed(parameters: Parameters) -> set[str]:
-    groups = [word.upper() for word in parameters.texts("POINT", "TYPE_GROUPS")[::2]]
-    keys = {*_COMPUTED, *groups} - {"MODELED_MARKERS", "MODELLED_MARKERS", "MARKERS", "LABELS"}
-    return {text for key in keys for text in parameters.texts("POINT", key) if text}
-
-
-def _is_output(label: str, listed: set[str]) -> bool:
+def _is_output(label: str, listed: Collection[str]) -> bool:
     return label in listed or _OUTPUT.search(_plain(label)) is not None
 
 
