@@ -16,11 +16,13 @@ from dynakin.filter.plate_motion import out_of_step_in_words
 from dynakin.filter.samples import Sample
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, about, warning, warnings_of
+from dynakin.recordings.plates.stuck import frozen_live_in_words
 from dynakin.recordings.recording import Recording
 from dynakin.settings.defaults import DELAY_S
 from dynakin.settings.lag import live_lag
 from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import Fused, Fusion
+from dynakin.stream.markers import LiveMarkers
 from dynakin.stream.monitor import Monitor
 from dynakin.stream.plate_motion import LivePlateMotion
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
@@ -83,6 +85,7 @@ class Live:
         self._recording: Sink | None = None
         self._reader = Reader(sources, wait_s)
         self._fusion: Fusion | None = None
+        self._markers: LiveMarkers | None = None
         self._window: deque[Fused] = deque()
         self._standing_since: float | None = None
         self._came_s = self._ready_s = 0.0
@@ -94,6 +97,7 @@ class Live:
         self._own = np.zeros(0, dtype=int)  # places of the model's markers among the stream's, after the last: missing
         self._plate_motion: LivePlateMotion | None = None
         self._mass_doubted = False
+        self._said_frozen = 0
         self._running = False
         self._labels_checked = False
         self._subject: dict[str, float] = {}
@@ -173,7 +177,7 @@ class Live:
         """Measure the model anew: ask to stand still."""
         self._running = False
         self._window.clear()
-        self._standing_since = None
+        self._standing_since = self._markers = None
 
     def _open(self) -> None:
         self.say("Waiting for the streams.")
@@ -260,12 +264,26 @@ class Live:
         self.say("Recording.")
 
     def _take(self, now_s: float) -> None:
-        for fused in self.fusion.poll(now_s):
+        for came in self.fusion.poll(now_s):
+            fused = self._measured(came)
             if self._running:
                 if not self._behind(fused):
                     self._step(fused)
             else:
                 self._stand(fused)
+        for name, since_s in self.fusion.frozen_plates[self._said_frozen :]:
+            self._said_frozen += 1
+            self.say(frozen_live_in_words(name, since_s))
+
+    def _measured(self, fused: Fused) -> Fused:
+        """A sample without markers that are no measurement."""
+        if self._markers is None:
+            info = self.fusion.markers
+            self._markers = LiveMarkers(info.names, info.rate_hz)
+        positions = self._markers.look(fused.sample.time_s, fused.positions)
+        for message in self._markers.news():
+            self.say(message)
+        return fused if positions is fused.positions else fused.with_positions(self.fusion.markers.names, positions)
 
     def _behind(self, fused: Fused) -> bool:
         """Whether to leave a frame out, so that what is shown is what happens now; some are always taken."""
