@@ -141,8 +141,8 @@ class LiveMarkers:
             self._repeats = repeated_so_far(np.stack(self._kept), self._rate, len(self._kept) - 1)
         if self._repeats:
             self._say(
-                time_s, "repeats", -1, "frames repeat the one before to the last digit while the person moves, first at "
-                f"{time_s:.2f} s. They are taken as missing; look whether the capture system fills frames.",
+                time_s, "repeats", -1, "frames repeat the one before to the last digit while the person moves, first "
+                f"at {time_s:.2f} s. They are taken as missing; look whether the capture system fills frames.",
             )  # fmt: skip
         return self._repeats
 
@@ -202,22 +202,23 @@ class LiveMarkers:
                     "them in the capture system.",
                 )  # fmt: skip
         for m, by_m in leaps.items():
-            if (window[-2, m] == window[-3, m]).all() or self._home(window, m, len(window) - 1, float(np.linalg.norm(by_m))):
+            if (window[-2, m] == window[-3, m]).all() or self._home(window, m, len(window) - 1, by_m):
                 continue
             near = nearest(window[:-1], m)
             apart = np.linalg.norm(window[:-1, near] - window[:-1, m : m + 1], axis=2)[-round(START_S * self._rate) :]
             self._off[m] = _Off(by_m, near, np.median(apart, axis=0))
         return positions
 
-    def _home(self, window: Array, m: int, frame: int, by_m: float) -> bool:
+    def _home(self, window: Array, m: int, frame: int, by_m: Array) -> bool:
         """Whether a marker comes to its place by a leap in a frame of the last ones (T, M, 3): it was off it before,
         unseen (`recordings.formats.jumps`)."""
         every = np.concatenate([np.stack(self._begun), window])
         apart = np.linalg.norm(every[:, nearest(every, m)] - every[:, m : m + 1], axis=2)
         begun = len(self._begun)
         usual, apart = usual_distances(apart, range(begun)), apart[begun:]
-        off = ~within(apart[max(frame - BESIDE, 0) : frame], usual, 2.0 * BACK * by_m)
-        return bool(off.all() and within(apart[frame:], usual, BACK * by_m).all())
+        size = float(np.linalg.norm(by_m))
+        off = ~within(apart[max(frame - BESIDE, 0) : frame], usual, 2.0 * BACK * size)
+        return bool(off.all() and within(apart[frame:], usual, BACK * size).all())
 
     @staticmethod
     def _changed_places(window: Array, a: int, b: int) -> bool:
@@ -242,7 +243,7 @@ class LiveMarkers:
                 frame = len(self._kept) - 1 - _DECIDED
                 found = [jump for jump in jumps(np.stack(self._kept)) if jump.marker == m and jump.frame == frame]
                 off.sure = bool(found) and float(np.linalg.norm(found[0].by_m)) > JUMP_M
-                off.sure = off.sure and not self._home(np.stack(self._kept), m, frame, float(np.linalg.norm(off.by_m)))
+                off.sure = off.sure and not self._home(np.stack(self._kept), m, frame, off.by_m)
                 if not off.sure:
                     del self._off[m]
                     continue

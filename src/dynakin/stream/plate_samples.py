@@ -51,8 +51,8 @@ class PlateSamples:
     def push(self, time: Array, wrenches: Array) -> None:
         """The next samples: (K,) s and (K, P, 6)."""
         values = np.asarray(wrenches, float).reshape(len(time), 6 * self.count)
-        each = (np.abs(wrenches) <= LARGEST_MOMENT_NM).all(axis=2)  # NaN is not
-        good = each.any(axis=1) & np.isfinite(time)
+        each: Flags = np.asarray((np.abs(wrenches) <= LARGEST_MOMENT_NM).all(axis=2))  # NaN is not
+        good: Flags = np.asarray(each.any(axis=1) & np.isfinite(time))
         time, values, each = np.asarray(time, float)[good], values[good], each[good]
         if not len(time):
             return

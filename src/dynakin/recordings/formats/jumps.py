@@ -230,9 +230,8 @@ def within(apart: Array, usual: Array, by_m: float) -> npt.NDArray[np.bool_]:
 
 def _comes_home(apart: Array, frame: int, start: int) -> bool:
     """Whether a marker lies among those near to it as at the start rather after a jump than before."""
-    home, before, behind = (
-        usual_distances(apart, part) for part in (range(start), range(max(frame - start, 0), frame), range(frame, frame + start))
-    )
+    parts = range(start), range(max(frame - start, 0), frame), range(frame, frame + start)
+    home, before, behind = (usual_distances(apart, part) for part in parts)
     known = np.isfinite(home + before + behind)
     return bool(known.any() and np.linalg.norm((behind - home)[known]) < np.linalg.norm((before - home)[known]))
 

@@ -88,8 +88,8 @@ def frozen_live_in_words(name: str, since_s: float) -> Message:
     """The same of a plate that is frozen now."""
     return warning(
         "plates",
-        f"{name} repeats one and the same row while somebody stands on it, from {since_s:.2f} s on, though its load moved "
-        "before: it is not measured as long as it does. Look whether its amplifier or its connection hangs.",
+        f"{name} repeats one and the same row while somebody stands on it, from {since_s:.2f} s on, though its load "
+        "moved before: it is not measured as long as it does. Look whether its amplifier or its connection hangs.",
     )
 
 
