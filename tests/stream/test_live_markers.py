@@ -114,19 +114,45 @@ def test_slow_cameras_tell_no_jump_from_a_fast_limb() -> None:
     assert np.isfinite(np.stack(every)).all()
 
 
-def test_a_session_takes_nothing_of_a_marker_off_its_place_and_says_so_once() -> None:
-    markers, frames, m = faulty("r_toe", 1.6, 1.8)
-    markers[frames, m] += [0.0, 0.03, 0.0]
-    recording = replace(walk(), markers=markers)
+def session(recording: Recording) -> tuple[list[LiveFrame], list[str]]:
+    """Its frames, and what is said."""
     seen: list[LiveFrame] = []
     said: list[str] = []
     model = dynakin.load_model("fullbody", dynakin.Subject(mass_kg=75.0, height_m=1.75))
-    session = Live(
+    Live(
         dynakin.Estimator(model), [Replay(recording, speed=0.0)], [Callback(seen.append)], lag_s=0.0, standing_s=0.4,
         standing_wait_s=0.6, say=said.append,
-    )  # fmt: skip
-    session.run()
+    ).run()  # fmt: skip
+    return seen, said
+
+
+def test_a_session_takes_nothing_of_a_marker_off_its_place_and_says_so_once() -> None:
+    markers, frames, m = faulty("r_toe", 1.6, 1.8)
+    markers[frames, m] += [0.0, 0.03, 0.0]
+    seen, said = session(replace(walk(), markers=markers))
     off = [frame for frame in seen if 1.6 <= frame.estimate.time_s < 1.8]
     assert len(off) == len(frames) and all(np.isnan(frame.fused.positions[m]).all() for frame in off)
     assert all("r_toe" in frame.status.missing for frame in off)
     assert sum("r_toe jumps off its place" in text for text in said) == 1
+
+
+def test_nobody_in_sight_is_no_seat() -> None:
+    markers, frames, _ = faulty("r_toe", 1.6, 2.0)
+    markers[frames] = np.nan
+    _, said = session(replace(walk(), markers=markers))
+    assert any("motion is lost" in text for text in said)
+    assert not any("no plate measures" in text for text in said)
+
+
+@pytest.mark.parametrize(("sign", "used"), [(1.0, True), (-1.0, False)])
+def test_plates_on_which_nobody_stood_are_checked_once_somebody_does(sign: float, used: bool) -> None:
+    recording = simulate("fullbody", "squat", 1, 6.0).recording
+    gain = np.where(recording.time < 1.5, 0.0, sign)[:, None]
+    plates = tuple(
+        replace(plate, force=gain * plate.force, moment=gain * plate.moment, free_moment=gain * plate.free_moment)
+        for plate in recording.plates
+    )
+    seen, said = session(replace(recording, plates=plates))
+    assert any("they are not checked" in text for text in said)
+    assert used is not any("The plates are not used any more" in text for text in said)
+    assert (seen[-1].status.plates == "used") is used
