@@ -16,7 +16,7 @@ from dynakin.recordings.times import rate_of, step_of
 UNEVEN = 0.1
 """Part of a step by which a sample's time may be off an even rate: files round their times, and a lost sample moves
 all others by half a step and more."""
-_PASS = 0.4  # end of the pass band, times the marker rate
+PASS = 0.4  # end of the pass band, times the marker rate
 _STOP = 0.6  # begin of the stop band: what lies between folds back only above the pass band
 _STOP_DB = 60.0
 _CAUSAL_ORDER = 4
@@ -74,7 +74,7 @@ def reach_s(rate_in: float, rate_out: float, cutoff_hz: float | None) -> float:
     kernel, and where the second's answer to an impulse has come down to a ten thousandth."""
     kernel = 0.0
     if rate_in > 1.01 * rate_out:
-        kernel = 0.5 * scipy.signal.kaiserord(_STOP_DB, (_STOP - _PASS) * rate_out / (0.5 * rate_in))[0] / rate_in
+        kernel = 0.5 * scipy.signal.kaiserord(_STOP_DB, (_STOP - PASS) * rate_out / (0.5 * rate_in))[0] / rate_in
     return kernel + (0.0 if cutoff_hz is None else 2.0 / cutoff_hz)
 
 
@@ -160,7 +160,7 @@ def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = 
 
 def low_pass_for(rate_in: float, rate_out: float) -> CausalLowPass | None:
     """The causal filter that goes before samples are picked at a lower rate (Hz), None where no filter is needed."""
-    return CausalLowPass(rate_in, _PASS * rate_out) if rate_in > 1.01 * rate_out else None
+    return CausalLowPass(rate_in, PASS * rate_out) if rate_in > 1.01 * rate_out else None
 
 
 def latest_before(time_in: Array, time_out: Array, step_s: float) -> npt.NDArray[np.intp]:
@@ -175,10 +175,10 @@ def same_times(a: Array, b: Array) -> bool:
 
 
 def _antialias(samples: Array, rate_in: float, rate_out: float) -> Array:
-    width = (_STOP - _PASS) * rate_out
+    width = (_STOP - PASS) * rate_out
     taps, beta = scipy.signal.kaiserord(_STOP_DB, width / (0.5 * rate_in))
     half = taps // 2
-    cutoff = min(0.5 * (_PASS + _STOP) * rate_out, 0.49 * rate_in)
+    cutoff = min(0.5 * (PASS + _STOP) * rate_out, 0.49 * rate_in)
     kernel = scipy.signal.firwin(2 * half + 1, cutoff, window=("kaiser", beta), fs=rate_in)
     reach = min(half, len(samples) - 1)
     padded = np.pad(samples, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")

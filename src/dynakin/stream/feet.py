@@ -41,6 +41,7 @@ Flags = npt.NDArray[np.bool_]
 _RISE_M_S = 0.0025  # how fast a marker's lowest place is forgotten, so that one bad moment does not stay
 _BELT_STEP_S, _BELT_EVERY_S = 0.018, 0.5  # a belt is looked for twice a second, in 50 moments a second
 _DT_S = (0.001, 0.05)  # how far ahead the feet are predicted
+_SEEN = 0.5  # part of the markers from which the motion of the centre of mass is seen
 _LEAST_S = 0.001  # between frames of which a share's rate is taken
 
 
@@ -132,18 +133,22 @@ class LiveFeet:
         bears &= ~np.array([name in loads.others for name in self.initial.contacts], dtype=bool)
         self.claimed = bool(loads.total_known[0] and not bears.any())
         if markers is not None and wrenches is not None:
-            loads = self._closed(loads, time_s, np.where(np.isfinite(markers), markers, places), wrenches, bears)
+            loads = self._closed(loads, time_s, markers, places, wrenches, bears)
         undeclared = loads.elsewhere & (wrenches is not None)
         whole = bool(loads.total_known[0] and not bears.any())
         return expected_loads(loads, self.initial, self.noise, paths, undeclared, bears), whole
 
-    def _closed(self, loads: FootLoads, time_s: float, markers: Array, wrenches: Array, bears: Flags) -> FootLoads:
+    def _closed(
+        self, loads: FootLoads, time_s: float, markers: Array, places: Array, wrenches: Array, bears: Flags
+    ) -> FootLoads:
         """The same where the plates do not carry what the motion of the centre of mass needs, `DELAY_S` ago."""
         if self._closure is None:
             self._closure = LiveClosure(self.initial)
         whole = bool(loads.total_known[0] and not bears.any())
-        force = self.initial.ground.wrench_to_ground(wrenches)[:, :3].sum(axis=0) if whole else None
-        if not self._closure.look(time_s, markers, force):
+        seen = np.isfinite(markers)
+        judged = whole and bool(seen.mean() >= _SEEN)  # what the filter expects shows no force
+        force = self.initial.ground.wrench_to_ground(wrenches)[:, :3].sum(axis=0) if judged else None
+        if not self._closure.look(time_s, np.where(seen, markers, places), force):
             return loads
         self._say(
             f"Something that no plate measures bears or pulls the person (a seat, a rail, a box): noticed {DELAY_S:g} "

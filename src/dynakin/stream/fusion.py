@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +41,11 @@ class Fused:
     positions: Array
     wrenches: Array | None
     arrived_s: float
+
+    def with_positions(self, names: Sequence[str], positions: Array) -> Fused:
+        """The same with other markers (M, 3) m."""
+        sample = replace(self.sample, markers=dict(zip(names, positions, strict=True)))
+        return replace(self, sample=sample, positions=positions)
 
 
 class Fusion:
@@ -93,6 +99,13 @@ class Fusion:
     def clock_restarts(self) -> int:
         """How often a clock was set back."""
         return max(clock.restarts for clock in self._clocks.values())
+
+    @property
+    def frozen_plates(self) -> list[tuple[str, float]]:
+        """Which plates repeated one row while somebody stood on them, from when on, s."""
+        if self._resampled is None or self.plates is None:
+            return []
+        return [(self.plates.names[p], since) for p, since in self._resampled.frozen]
 
     def markers_silent(self, now_s: float) -> bool:
         """Whether nothing comes from the markers."""

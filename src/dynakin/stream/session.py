@@ -10,23 +10,25 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.blas import one_blas_thread
-from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
+from dynakin.errors import DivergenceError, DynakinError, ModelError, RecordingError, StreamError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.plate_motion import out_of_step_in_words
 from dynakin.filter.samples import Sample
 from dynakin.filter.tracker import Tracker
-from dynakin.messages import Message, about, warning, warnings_of
+from dynakin.messages import Message, about, note, warning, warnings_of
+from dynakin.recordings.plates.stuck import frozen_live_in_words
 from dynakin.recordings.recording import Recording
 from dynakin.settings.defaults import DELAY_S
 from dynakin.settings.lag import live_lag
 from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import Fused, Fusion
+from dynakin.stream.markers import LiveMarkers
 from dynakin.stream.monitor import Monitor
 from dynakin.stream.plate_motion import LivePlateMotion
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
 from dynakin.stream.sources.packets import Source
 from dynakin.stream.sources.reader import Notice, Reader
-from dynakin.stream.start import begin, check_labels, quietest, recording_of, stands, unknown_mass
+from dynakin.stream.start import begin, check_labels, check_loaded, loaded, quietest, recording_of, stands, unknown_mass
 
 Array = npt.NDArray[np.float64]
 
@@ -35,6 +37,7 @@ _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is
 _DEVIATIONS_S, _DELAYED_DEVIATIONS_S = 0.2, 1.0  # those of a lag take 0.6 steps for each of its frames
 _SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
 _CATCH_UP_S = 1.0  # with what came while the model was measured: that is left out too, but is no sign of slowness
+_CHECKED_S, _UNLOADED = 1.0, 10  # of standing on the plates, by which they are checked; so often nobody does
 _MISSING = np.full(3, np.nan)
 _MASS_KG = 70.0  # of a person of whom nothing is known, so that at least the movement is seen
 
@@ -83,6 +86,7 @@ class Live:
         self._recording: Sink | None = None
         self._reader = Reader(sources, wait_s)
         self._fusion: Fusion | None = None
+        self._markers: LiveMarkers | None = None
         self._window: deque[Fused] = deque()
         self._standing_since: float | None = None
         self._came_s = self._ready_s = 0.0
@@ -94,6 +98,9 @@ class Live:
         self._own = np.zeros(0, dtype=int)  # places of the model's markers among the stream's, after the last: missing
         self._plate_motion: LivePlateMotion | None = None
         self._mass_doubted = False
+        self._said_frozen = 0
+        self._unloaded = 0
+        self._unchecked: deque[Fused] | None = None  # of late, while nobody has stood on the plates
         self._running = False
         self._labels_checked = False
         self._subject: dict[str, float] = {}
@@ -173,7 +180,7 @@ class Live:
         """Measure the model anew: ask to stand still."""
         self._running = False
         self._window.clear()
-        self._standing_since = None
+        self._standing_since = self._markers = None
 
     def _open(self) -> None:
         self.say("Waiting for the streams.")
@@ -183,8 +190,8 @@ class Live:
         assert markers is not None
         force_plates = "no plates" if plates is None else f"{len(plates.names)} plates at {plates.rate_hz:g} Hz"
         self.say(f"Streams: {len(markers.names)} markers at {markers.rate_hz:g} Hz, {force_plates}.")
-        for note in streams.notes:
-            self.say(note)
+        for text in streams.notes:
+            self.say(text)
         if self.lag_s:
             self.say(f"Estimates come {1e3 * self.lag_s:.3g} ms late, from the frames until then (--lag 0: at once).")
         if not streams.paced:
@@ -260,12 +267,26 @@ class Live:
         self.say("Recording.")
 
     def _take(self, now_s: float) -> None:
-        for fused in self.fusion.poll(now_s):
+        for came in self.fusion.poll(now_s):
+            fused = self._measured(came)
             if self._running:
                 if not self._behind(fused):
                     self._step(fused)
             else:
                 self._stand(fused)
+        for name, since_s in self.fusion.frozen_plates[self._said_frozen :]:
+            self._said_frozen += 1
+            self.say(frozen_live_in_words(name, since_s))
+
+    def _measured(self, fused: Fused) -> Fused:
+        """A sample without markers that are no measurement."""
+        if self._markers is None:
+            info = self.fusion.markers
+            self._markers = LiveMarkers(info.names, info.rate_hz)
+        positions = self._markers.look(fused.sample.time_s, fused.positions)
+        for message in self._markers.news():
+            self.say(message)
+        return fused if positions is fused.positions else fused.with_positions(self.fusion.markers.names, positions)
 
     def _behind(self, fused: Fused) -> bool:
         """Whether to leave a frame out, so that what is shown is what happens now; some are always taken."""
@@ -311,7 +332,7 @@ class Live:
             self.say(f"Nobody stood still for {self.standing_s:g} s.")
             self.say(text if self.static is None else "Lengths and marker places are those of the standing trial.")
         try:
-            self._tracker, said, self._use_plates = begin(
+            self._tracker, said, usable = begin(
                 self.estimator,
                 recording,
                 static=static,
@@ -328,6 +349,7 @@ class Live:
         for message in said:
             self.say(message)
         self._mass_doubted = bool(warnings_of(about(said, "weight")))
+        self._use_plates, self._unchecked = usable is not False, deque() if usable is None else None
         self._begin_running("Ready: move.")
 
     def _begin_running(self, text: str) -> None:
@@ -356,6 +378,8 @@ class Live:
     def _step(self, fused: Fused) -> None:
         monitor, tracker = self._monitor, self.tracker
         assert monitor is not None
+        if self._unchecked is not None and fused.wrenches is not None:
+            self._check_plates(self._unchecked, fused)
         sample, feet, whole = fused.sample, None, True
         if self._feet is not None:
             wrenches = fused.wrenches if self._use_plates else None
@@ -390,6 +414,39 @@ class Live:
         motion = monitor.motion(estimate, fused)
         for text in [*news, *motion, *monitor.settling(sample.time_s, state, tracker)]:
             self.say(text)
+
+    def _check_plates(self, kept: deque[Fused], fused: Fused) -> None:
+        """Plates on which nobody stood at the start are checked once somebody has for a second."""
+        kept.append(fused)
+        since = fused.sample.time_s - kept[0].sample.time_s
+        if 0.0 <= since < _CHECKED_S:
+            return
+        info, plates = self.fusion.markers, self.fusion.plates
+        assert plates is not None and self._monitor is not None
+        recording = recording_of(list(kept), info.names, plates.names)
+        kept.clear()
+        if not loaded(recording):
+            self._unloaded += 1
+            if self._unloaded == _UNLOADED:
+                self.say(
+                    note(
+                        "plates",
+                        f"Nobody has stood on the plates for {_UNLOADED * _CHECKED_S:.0f} s. If somebody does, look at "
+                        "their channels and the unit of their forces.",
+                    )
+                )
+            return
+        self._unchecked = None
+        try:
+            said, usable = check_loaded(self.estimator, self.tracker.calibrated, recording)
+        except RecordingError as error:
+            said, usable = [warning("plates", f"{error.message}. The plates are not used any more.")], False
+        for message in said:
+            self.say(message)
+        self._mass_doubted |= bool(warnings_of(about(said, "weight")))
+        if not usable:
+            self._use_plates = self._monitor.used = False
+            self._plate_motion = None
 
     def _ask_plates(self, asked: LivePlateMotion, time_s: float, markers: Array, wrenches: Array, whole: bool) -> None:
         """Plates out of step are brought into it; of plates with other axes nothing is taken any more; that they carry

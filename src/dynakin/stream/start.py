@@ -150,7 +150,7 @@ def begin(
     known: Mapping[str, tuple[float, float]] | None = None,
     lag_s: float = 0.0,
     rate_hz: float | None = None,
-) -> tuple[Tracker, list[Message], bool]:
+) -> tuple[Tracker, list[Message], bool | None]:
     """Calibrate the model on the standing person.
 
     Args:
@@ -159,7 +159,8 @@ def begin(
         lag_s, rate_hz: as in `Estimator.start`.
 
     Returns:
-        what is ready to step, what there is to say, and whether the plates can be used.
+        what is ready to step, what there is to say, and whether the plates can be used; None where nobody stands on
+        them yet, as `check_loaded` tells later.
 
     Raises:
         ModelError, RecordingError: model, markers and plates do not fit.
@@ -171,31 +172,43 @@ def begin(
     if known:
         tracker = estimator.start(_continued(initial, known), lag_s=lag_s, rate_hz=rate_hz)
         said.append(note("calibration", f"Lengths, marker places and masses go on from {len(known)} saved values."))
-    usable = True
-    if standing.plates:
-        if _most_force(standing) < JUDGED_N:
-            return tracker, [*said, note("plates", "Nobody stands on the plates yet; they are not checked.")], usable
-        check = check_plates(
-            static if static is not None and _most_force(static) >= JUDGED_N else standing,
-            initial.ground,
-            None if initial.feet else initial.weighed_kg,
-            initial.foot_markers,
-        )
-        if check.refusal:
-            raise RecordingError(f"plates: {check.refusal}")
-        weighed = check.mass_kg_from_plates is not None
-        said += warnings_of(check.messages)
-        said += notes_of(about(check.messages, "weight")) if weighed else []
-        mass, tolerance = check.mass_kg_from_plates, estimator.noise.plate_load_tolerance
-        if mass is not None and tolerance is not None and abs(mass - initial.weighed_kg) > tolerance * mass:
-            usable = False
-            text = f"the plates carry {mass:.1f} kg where the person weighs {initial.weighed_kg:.1f} kg"
-            said.append(warning("weight", f"{text}; the plates are not used."))
-        elif mass is not None and initial.feet:
-            ratio = mass / initial.weighed_kg
-            doubt = doubtful_mass(np.zeros((0, 6)), initial.weighed_kg, ratio, initial.unseen_kg)
-            said += [doubt] if doubt else []
-    return tracker, said, usable
+    if not standing.plates:
+        return tracker, said, True
+    if not loaded(standing):
+        return tracker, [*said, note("plates", "Nobody stands on the plates yet; they are not checked.")], None
+    told, usable = check_loaded(
+        estimator, initial, static if static is not None and _most_force(static) >= JUDGED_N else standing
+    )
+    return tracker, [*said, *told], usable
+
+
+def loaded(recording: Recording) -> bool:
+    """Whether somebody stands on the plates for half of a recording."""
+    push = np.sum([np.nan_to_num(np.linalg.norm(plate.force, axis=1)) for plate in recording.plates], axis=0)
+    return bool(np.mean(push >= JUDGED_N) >= 0.5)
+
+
+def check_loaded(estimator: Estimator, initial: CalibratedModel, recording: Recording) -> tuple[list[Message], bool]:
+    """What there is to say of plates on which somebody stands, and whether they can be used.
+
+    Raises:
+        RecordingError: they cannot be meant so.
+    """
+    check = check_plates(recording, initial.ground, None if initial.feet else initial.weighed_kg, initial.foot_markers)
+    if check.refusal:
+        raise RecordingError(f"plates: {check.refusal}")
+    weighed = check.mass_kg_from_plates is not None
+    said = warnings_of(check.messages)
+    said += notes_of(about(check.messages, "weight")) if weighed else []
+    mass, tolerance = check.mass_kg_from_plates, estimator.noise.plate_load_tolerance
+    if mass is not None and tolerance is not None and abs(mass - initial.weighed_kg) > tolerance * mass:
+        text = f"the plates carry {mass:.1f} kg where the person weighs {initial.weighed_kg:.1f} kg"
+        return [*said, warning("weight", f"{text}; the plates are not used.")], False
+    if mass is not None and initial.feet:
+        ratio = mass / initial.weighed_kg
+        doubt = doubtful_mass(np.zeros((0, 6)), initial.weighed_kg, ratio, initial.unseen_kg)
+        said += [doubt] if doubt else []
+    return said, True
 
 
 def _most_force(recording: Recording) -> float:

@@ -25,6 +25,9 @@ _LEAP, _LEAP_M, _NEXT = 1.6, 0.005, 3
 longer a larger one; of 5 mm at least, by less nothing is off."""
 _STOP_M = 0.002
 """From such a step nothing comes to rest, or starts, within one frame."""
+_GOES_ON, _BEFORE, _MOVED_M = 0.5, 12, 1e-4
+"""Part of the step by which a marker came to its place that all near it still make, where it is held. Frames in which
+it usually moved before it was, by more than rounding and what a filter leaves at rest."""
 _NEAR, _LEFT_M = 3, 0.05
 """By so much so many nearest markers of a segment, or of the next, do not change their distance to a marker, all of
 them, unless it is not on the body any more: by skin 0.02."""
@@ -96,6 +99,36 @@ def held(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
             ):
                 found[first + (first > 0) : end + (end == len(step)), m] = True
     return found
+
+
+def repeated_so_far(markers: Array, rate: float, first: int) -> bool:
+    """`repeated`, of frames that are one from ``first`` on to the last, by what was before."""
+    step = np.linalg.norm(np.diff(markers[max(first - 1, 0) : first + 1], axis=0), axis=2)
+    step = step[np.isfinite(step)]
+    least = max(MOVES_M_S / rate, _ROUNDED * _smallest_step(markers))
+    return len(step) > 2 and float(np.median(step)) > least
+
+
+def held_so_far(markers: Array, m: int, first: int) -> bool:
+    """`held`, of a marker that is at one place from frame ``first`` on to the last: by how it moved before (one step of
+    speed, or several of noise alone, that stop to the last digit), while those near it go on as they did, or by all
+    that is near having gone away."""
+    goes = np.linalg.norm(markers[-1] - markers[-2], axis=1)
+    others = np.flatnonzero(goes > 0.0)  # what is held with it shows nothing
+    ends = np.concatenate([markers[[first, -1]][:, [m]], markers[[first, -1]][:, others]], axis=1)
+    if _left_alone(ends, 0):
+        return True
+    near = others[np.argsort(np.linalg.norm(ends[0, 1:] - ends[0, 0], axis=1))[:_NEAR]]
+    steps = np.linalg.norm(np.diff(markers[max(first - _BEFORE, 0) :], axis=0), axis=2)
+    own, after = steps[: -(len(markers) - 1 - first), m], steps[-(len(markers) - 1 - first) :, near]
+    own = own[np.isfinite(own)]
+    if len(near) < _NEAR or len(own) < _NEXT:
+        return False
+    tick = _KINK * max(_smallest_step(markers[:, m]), _FINEST_M)
+    if len(after) >= _NEXT:
+        moves = max(tick, _MOVED_M)
+        return bool(min(np.median(own), own[-1]) > moves and (np.median(after, axis=0) > moves).all())
+    return bool(own[-1] > max(_STOP_M, tick) and (after[-1] > _GOES_ON * own[-1]).all())
 
 
 def _left_alone(ends: Array, m: int) -> bool:

@@ -19,7 +19,9 @@ from dynakin.errors import OutputError, RecordingError
 from dynakin.messages import note, warning
 from dynakin.pipeline.result import Result
 from dynakin.pipeline.stages import run_case
+from dynakin.recordings.formats.trajectories import clean_markers
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
+from dynakin.recordings.plates.stuck import frozen_live_in_words, without_dead_channels
 from dynakin.recordings.recording import Recording
 from dynakin.results.files.folder import check_output_writable
 from dynakin.settings.defaults import DELAY_S
@@ -154,7 +156,7 @@ class Recorded(NamedTuple):
 
     Attributes:
         samples: fused as they were live. begun: what it began with: "settings", "subject" and "delay_s" (the last two
-            are not in old recordings). holes: where the file is damaged.
+            are not in old recordings). holes: where the file is damaged. frozen: plates that stood still, from when on.
     """
 
     samples: list[Fused]
@@ -162,6 +164,7 @@ class Recorded(NamedTuple):
     plates: StreamInfo | None
     begun: dict[str, Any]
     holes: list[Hole]
+    frozen: list[tuple[str, float]]
 
 
 def read_recorded(folder: str | Path) -> Recorded:
@@ -198,7 +201,8 @@ def read_recorded(folder: str | Path) -> Recorded:
         raise RecordingError(f"{path}: holds no recorded session")
     if damaged:
         holes.append(Hole(last_s, np.inf))
-    return Recorded(found + fusion.poll(np.inf), fusion.markers, fusion.plates, begun, holes)
+    found += fusion.poll(np.inf)
+    return Recorded(found, fusion.markers, fusion.plates, begun, holes, fusion.frozen_plates)
 
 
 def recorded(folder: str | Path) -> Recording:
@@ -234,7 +238,7 @@ def _recording(found: Recorded, folder: str | Path) -> Recording:
     subject = found.begun.get("subject")
     made = recording_of(found.samples, found.markers.names, names, Path(folder).name, subject)
     if not found.holes:
-        return made
+        return _as_read(made, found, folder)
     filled = _with_lost_frames(made, 1.0 / found.markers.rate_hz, found.holes)
     lost, count = filled.n_frames - made.n_frames, len(found.holes)
     when = ", ".join(_when(hole) for hole in found.holes[:_NAMED])
@@ -244,7 +248,14 @@ def _recording(found: Recorded, folder: str | Path) -> Recording:
         f"recorded there cannot be read; frames of markers that are missing for it: {lost}."
     )
     said = warning("recording", text) if lost else note("recording", text)
-    return replace(filled, notes=(*filled.notes, said))
+    return _as_read(replace(filled, notes=(*filled.notes, said)), found, folder)
+
+
+def _as_read(recording: Recording, found: Recorded, folder: str | Path) -> Recording:
+    """Without what is no measurement, as a file is read."""
+    markers, notes = clean_markers(recording.marker_names, recording.markers, recording.time, Path(folder) / FILE)
+    notes += [frozen_live_in_words(name, since_s) for name, since_s in found.frozen]
+    return without_dead_channels(replace(recording, markers=markers, notes=(*recording.notes, *notes)))
 
 
 def _when(hole: Hole) -> str:
