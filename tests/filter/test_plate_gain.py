@@ -18,6 +18,7 @@ from dynakin.filter.expected import plate_errors
 from dynakin.filter.plate_gain import SENSOR_M
 from dynakin.filter.prepared import Prepared
 from dynakin.messages import about
+from dynakin.recordings.feet.loads import MEASURED, UNKNOWN
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.simulation.trial import simulate as simulate_anew
 
@@ -133,3 +134,24 @@ def test_what_a_gain_is_off_by_is_all_of_the_load_or_one_sensors() -> None:
     np.testing.assert_allclose(sd[1], 80.0, rtol=0.02)
     np.testing.assert_allclose(sd[3:], 80.0 * SENSOR_M, rtol=0.02)
     np.testing.assert_allclose(sd[[0, 2]], np.hypot(np.hypot(2.0, 4.0), 6.0), rtol=1e-6)
+
+
+@pytest.mark.parametrize("too_much_n", [150.0, 220.0])
+def test_a_foot_alone_on_a_plate_that_says_too_much_is_not_measured_meanwhile(too_much_n: float) -> None:
+    """For 0.3 s, where the foot presses: no gain, and nothing that bears elsewhere."""
+    recording = walk()
+    on = np.flatnonzero(recording.plates[1].force[:, 1] > 300.0)
+    middle = recording.time[on].mean()
+    more = too_much_n * (np.abs(recording.time - middle) < 0.15)
+
+    def pushed(plate: Plate) -> Plate:
+        force = plate.force + np.stack([0.0 * more, more, 0.0 * more], axis=1)
+        return replace(plate, force=force, moment=np.cross(np.nan_to_num(plate.cop), force) + plate.free_moment)
+
+    ready, right = person().prepare(with_plate(recording, 1, pushed)), person().prepare(recording)
+    loads, before = ready.ground.loads, right.ground.loads
+    assert loads is not None and before is not None and not said_of_gains(ready)
+    stands = loads.on[:, :, 1] & (more > 0.0)[:, None]
+    assert (before.reason[stands] == MEASURED).all() and (loads.reason[stands] == UNKNOWN).mean() > 0.9
+    other = loads.on[:, :, [0, 2]].any(axis=2) & ~loads.on[:, :, 1]
+    assert (loads.reason[other] == before.reason[other]).mean() > 0.95

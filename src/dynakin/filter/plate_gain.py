@@ -25,9 +25,9 @@ Flags = npt.NDArray[np.bool_]
 APART, SIGMAS = 0.03, 3.0
 """Part by which a plate's vertical force may differ from what the motion needs of it, beside the others', and how many
 of its standard deviations it takes to say so (1 to 2 % where each stance has a plate of its own; a squat on two plates,
-which bear alike all the time, leaves 2 to 5 %). Chosen on `truth3d`'s seeds 1 to 4 and 25 simulated walks of others: up
-to 1.8 deviations, or 1.5 % where it is known to 1.5. 60 other trials, which did not choose, stay below 1.7, real ones
-below 2.4 (`subject01_walk1`: 1.2 %)."""
+which bear alike all the time, leaves 2 to 5 %). Chosen on one walk with a plate 5 and 10 % too high and with a sensor a
+fifth too low (3.8, 7.0 and 3.2 deviations), `truth3d`'s seeds 1 to 4 and 25 simulated walks of others (up to 1.8). Some
+150 other recordings without such faults, which did not choose, stay below 2.4 (`subject01_walk1`: 1.2 %)."""
 LEAST_S = 0.2
 """Seconds of the whole weight that a plate must have borne."""
 ALIKE, BORNE, ALIKE_S = 1.5, 0.05, 0.1

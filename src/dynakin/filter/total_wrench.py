@@ -338,7 +338,7 @@ def _judged(
         words = f"In {np.count_nonzero(found.undeclared)} of {n} frames the plates' sum is not used because of that."
         reasons.append(note("sum of the plates", words))
     elif found.undeclared.any():
-        text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench)
+        text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench, loads)
         reasons.append(text)
     if found.too_much is not None and loads is not None:
         undeclared |= claimed
@@ -422,9 +422,15 @@ def _declared_in_words(found: Closure, bears: Flags, names: list[str], time: Arr
 
 
 def _undeclared_in_words(
-    found: Closure, recording: Recording, initial: CalibratedModel, markers: Array, wrench: Array
+    found: Closure,
+    recording: Recording,
+    initial: CalibratedModel,
+    markers: Array,
+    wrench: Array,
+    loads: FootLoads | None,
 ) -> tuple[Message, Flags]:
-    """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts."""
+    """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts: what they have
+    too much is under a foot that stands alone (a load that somebody carries is between two)."""
     time, feet = recording.time, foot_markers(initial)
     beyond = np.zeros((len(time), len(feet)), dtype=bool)
     judged = np.isfinite(found.excess[:, 1])
@@ -469,7 +475,8 @@ def _undeclared_in_words(
             distance = distance_to_hull(place, markers[first:end][:, own][:, :, [0, 2]])
             if np.isfinite(distance).any():
                 away.append(float(np.nanmedian(distance)))
-                beyond[first:end, k] = sizes[-1][0] > 0.0 and away[-1] < NEAR_M
+                under = sizes[-1][0] > 0.0 or (loads is not None and _stands_alone(loads, k, slice(first, end)))
+                beyond[first:end, k] = under and away[-1] < NEAR_M
     size, axis = max(sizes, key=lambda pair: abs(pair[0]))
     near = f", {min(away):.2f} m or more from the feet" if away and not beyond.any() else ""
     return (
@@ -482,6 +489,12 @@ def _undeclared_in_words(
             f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The plates' sum is not used there.",
         )
     ), beyond
+
+
+def _stands_alone(loads: FootLoads, k: int, frames: slice) -> bool:
+    """Whether foot number k is the only one on a plate in most of the frames."""
+    standing = loads.on[frames].any(axis=2)
+    return bool((standing[:, k] & (standing.sum(axis=1) == 1)).mean() > 0.5)
 
 
 def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unseen_kg: float = 0.0) -> Message | None:
