@@ -493,7 +493,7 @@ def _undeclared_in_words(
 
 def _stands_alone(loads: FootLoads, k: int, frames: slice) -> bool:
     """Whether foot number k is the only one on a plate in most of the frames."""
-    standing = loads.on[frames].any(axis=2)
+    standing: Flags = np.asarray(loads.on[frames].any(axis=2))
     return bool((standing[:, k] & (standing.sum(axis=1) == 1)).mean() > 0.5)
 
 
