@@ -22,7 +22,7 @@ Topic = Literal[
     "rate",  # movement and forces that do not fit each other's times
     "weight",  # plates beside the mass
     "zero",  # plates that push sideways all the time
-    "gain",  # plates whose horizontal force is too large or small
+    "gain",  # plates whose forces are too large or small
     "carried",  # what is in the hands
     "marker set",  # which one was chosen
     "labels",  # markers that are not where their names say

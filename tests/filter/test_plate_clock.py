@@ -97,6 +97,44 @@ def test_a_real_walk_is_found_to_be_moved_as_far_as_it_was(data_dir: Path) -> No
     assert found[1].delay_s - found[0].delay_s == pytest.approx(0.008, abs=0.0015)
 
 
+def drifting(recording: Recording, drift: float) -> Recording:
+    """Its plates' clock is faster by that part, and right in the middle."""
+    return brought_into_step(recording, -drift * (recording.time - recording.time.mean()))
+
+
+@pytest.mark.parametrize("drift", [0.03, -0.03])
+def test_a_clock_that_is_faster_or_slower_is_found_and_plates_are_brought_into_step(drift: float) -> None:
+    """Known to half a percent by the 1.2 s in which its three plates carry the person."""
+    whole = simulate("fullbody", "gait", 7, 4.0).recording
+    before, ready = person().prepare(whole), person().prepare(drifting(whole, drift))
+    assert not about(before.messages, "rate")
+    (said,) = about(ready.messages, "rate")
+    assert said.level == "warning" and ("faster" if drift > 0.0 else "slower") in said.text
+    assert float(said.text.split("clock is ")[1].split()[0]) == pytest.approx(100.0 * abs(drift), abs=0.4)
+    assert abs(ready.ground.behind_s) < 0.006
+    both = np.isfinite(ready.wrench).all(axis=1) & np.isfinite(before.wrench).all(axis=1)
+    assert both.sum() > 0.8 * np.isfinite(before.wrench).all(axis=1).sum()
+    assert np.abs(ready.wrench[both] - before.wrench[both])[:, :3].mean() < 3.0
+
+
+def test_a_real_squat_shows_a_clock_that_drifts_and_none_that_does_not(data_dir: Path) -> None:
+    folder = data_dir / "opencap_subject4"
+    squats = dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
+    assert not about(person().prepare(squats).messages, "rate")
+    (said,) = about(person().prepare(drifting(squats, 0.005)).messages, "rate")
+    assert float(said.text.split("clock is ")[1].split()[0]) == pytest.approx(0.5, abs=0.15)
+
+
+def test_no_drift_is_asked_for_where_a_load_that_moves_looks_like_one() -> None:
+    ready, recording = prepared(), drifting(simulate("fullbody", "gait", 7, 4.0).recording, 0.03)
+    markers, wrench = recording_arrays(recording, ready.calibrated)
+    known = np.where(np.isfinite(ready.wrench).all(axis=1, keepdims=True), wrench, np.nan)
+    asked, not_asked = (
+        clock_delay(ready.calibrated, recording.time, markers, known, drifts) for drifts in (True, False)
+    )
+    assert asked is not None and not_asked is not None and asked.drift > 0.02 and not_asked.drift == 0.0
+
+
 def test_who_lands_shows_no_few_milliseconds() -> None:
     """Flesh follows later than bones."""
     ready, recording = prepared(), simulate("fullbody", "gait", 7, 4.0).recording

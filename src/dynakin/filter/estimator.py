@@ -253,7 +253,14 @@ class Estimator:
         elif ground.loads is not None:
             paths = ContactPaths.of(calibrated).at(markers)
             contacts = expected_loads(
-                ground.loads, calibrated, self.noise, paths, ground.undeclared, ground.bears, ground.shear
+                ground.loads,
+                calibrated,
+                self.noise,
+                paths,
+                ground.undeclared,
+                ground.bears,
+                ground.shear,
+                ground.off_gain,
             )
         doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio, calibrated.unseen_kg)
         return Prepared(recording, tracker, markers, wrench, ground, contacts, lag_s, doubt, tuple(unsmoothed))

@@ -17,6 +17,7 @@ import scipy.linalg
 
 from dynakin.arrays import filled, mean_seen
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
+from dynakin.filter.plate_gain import SENSOR_M
 from dynakin.filter.shear import NO_SHEAR, Shear
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
@@ -87,6 +88,7 @@ def expected_loads(
     undeclared: Flags,
     bears: Flags,
     shear: Shear = NO_SHEAR,
+    off_gain: Array | None = None,
 ) -> ContactLoads:
     """The feet's wrenches, those of the declared contacts and, last, the residual: what neither they nor the model
     explain, on the root.
@@ -96,6 +98,7 @@ def expected_loads(
         undeclared: (T,) frames in which something else bears the person.
         bears: (T, C) frames in which a declared contact may bear; where plates measure it, these say.
         shear: by how much more than usual the plates' horizontal forces may be off.
+        off_gain: (T, F) part of its load by which the plate under each foot may be off; not given: none is.
     """
     weight, root, C = initial.weighed_kg * GRAVITY_M_S2, paths[:, 0], len(initial.contacts)
     feet = _CONTACT[loads.reason]
@@ -117,9 +120,10 @@ def expected_loads(
     each = np.arange(K)
     places = np.concatenate([loads.soles.middle, paths[:, 1:]], axis=1)
     places = np.where(np.isfinite(places), places, (root * [1.0, 0.0, 1.0])[:, None])
-    errors[:, each, :, each] = (
-        plate_errors(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), shear).reshape(frames, K, 6, 6).swapaxes(0, 1)
-    )
+    gains = np.zeros((frames, K))
+    gains[:, :F] = 0.0 if off_gain is None else off_gain
+    by_plates = plate_errors(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), shear, gains.reshape(-1))
+    errors[:, each, :, each] = by_plates.reshape(frames, K, 6, 6).swapaxes(0, 1)
     for k in range(K):
         off = unmeasured[:, k]
         if not (off | (contact[:, k] == SHARED_PLATE)).any():
@@ -132,7 +136,7 @@ def expected_loads(
         wrench[off, k], effects[off, :, k] = prior.mean[off], prior.spread[off]
         errors[off, k, :, k] = _about(root[off], np.array([_WHITE_N] * 3 + [_WHITE_NM] * 3))
     for t in np.flatnonzero((contact == SHARED_PLATE).any(axis=1)):
-        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors, places, shear)
+        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors, places, shear, gains)
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -156,16 +160,21 @@ def residual_sd(noise: Noise, initial: CalibratedModel) -> Array:
     return np.where(size.all(), np.hypot(size, more), size)
 
 
-def plate_errors(wrench: Array, contact: Array, off: Shear = NO_SHEAR) -> Array:
+def plate_errors(wrench: Array, contact: Array, off: Shear = NO_SHEAR, off_gain: Array | float = 0.0) -> Array:
     """Covariances (T, 6, 6) about the ground's origin of what a plate says, (T, 6) about it too: at its centre of
-    pressure on the level of the contact (T, 3) m, at that itself where the plate is hardly loaded."""
+    pressure on the level of the contact (T, 3) m, at that itself where the plate is hardly loaded.
+
+    Args:
+        off_gain: (T,) part of its load by which the plate may be off, all of it or a sensor's `SENSOR_M` away.
+    """
     push, height = np.maximum(np.abs(wrench[:, 1]), LOADED_N), contact[:, 1]
     z, x = (wrench[:, 2] * height - wrench[:, 3]) / push, (wrench[:, 0] * height + wrench[:, 5]) / push
     loaded = (wrench[:, 1] > LOADED_N)[:, None]
     pressure = np.where(loaded, np.stack([x, height, z], axis=1), contact)
     shear = np.hypot(np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), off.sd(wrench))
-    lift = np.hypot(PLATE_NOISE_N, PLATE_GAIN * push)
-    moment = np.hypot(PLATE_NOISE_NM, PLATE_PLACE_M * push)
+    shear = np.hypot(shear, off_gain * np.hypot(wrench[:, 0], wrench[:, 2]))
+    lift = np.hypot(PLATE_NOISE_N, np.hypot(PLATE_GAIN, off_gain) * push)
+    moment = np.hypot(PLATE_NOISE_NM, np.hypot(PLATE_PLACE_M, SENSOR_M * off_gain) * push)
     return _about(pressure, np.stack([shear, lift, shear, moment, moment, moment], axis=1))
 
 
@@ -222,10 +231,11 @@ def _divide(
     errors: Array,
     places: Array,
     shear: Shear,
+    gains: Array,
 ) -> None:
     """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
-    plate = plate_errors(wrench[t, feet].sum(axis=0)[None], places[t, feet[:1]], shear)[0]
+    plate = plate_errors(wrench[t, feet].sum(axis=0)[None], places[t, feet[:1]], shear, gains[t, feet[:1]])[0]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
     root = np.linalg.cholesky(S)

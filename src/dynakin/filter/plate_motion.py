@@ -184,9 +184,19 @@ def _misfits(needed: Needed, force: Array, longest_s: float) -> _Misfits:
     return _Misfits(delays, misfits, np.array([needed.judged_s(each) for each in moved]))
 
 
-def out_of_step_in_words(delay_s: float, sd_s: float) -> str:
+def out_of_step_in_words(delay: Delay) -> str:
     """Which way, and by how much."""
-    return f"By the motion {clock_in_words(delay_s, sd_s)}"
+    return f"By the motion {clock_in_words(delay.delay_s, delay.sd_s)}"
+
+
+def drift_in_words(delay: Delay, time: Array) -> str:
+    """The same of a clock that is faster or slower, at the first and the last of the times (T,) s."""
+    ends = [f"{abs(ms):.0f} ms {'behind' if ms >= 0.0 else 'ahead'}" for ms in 1000.0 * delay.lags(time)[[0, -1]]]
+    by = f"{100.0 * abs(delay.drift):.2f} % {'faster' if delay.drift > 0.0 else 'slower'} than the markers'"
+    return (
+        f"By the motion the plates' clock is {by} (standard deviation {100.0 * delay.drift_sd:.2f} %): {ends[0]} at "
+        f"the first frame, {ends[1]} at the last"
+    )
 
 
 def clock_in_words(delay_s: float, sd_s: float) -> str:
@@ -231,8 +241,9 @@ def wrong_rate_in_words(rate: float, fitting: float, slope: float) -> str:
     )
 
 
-def brought_into_step(recording: Recording, delay_s: float) -> Recording:
-    """The recording with what its plates say so much later at each time; not known (NaN) where they end before."""
+def brought_into_step(recording: Recording, delay_s: float | Array) -> Recording:
+    """The recording with what its plates say so much later, one or (T,), at each time; not known (NaN) where they end
+    before."""
 
     def of(plate: Plate) -> Plate:
         values = (plate.force, plate.moment, plate.cop, plate.free_moment)
@@ -242,7 +253,7 @@ def brought_into_step(recording: Recording, delay_s: float) -> Recording:
     return recording.with_plates(tuple(of(plate) for plate in recording.plates))
 
 
-def _later(time: Array, values: Array, delay_s: float) -> Array:
+def _later(time: Array, values: Array, delay_s: float | Array) -> Array:
     """`in_step` of values (T, 3), but NaN farther than `HELD_S` beyond the recording."""
     then = time + delay_s
     inside = (then >= time[0] - HELD_S) & (then <= time[-1] + HELD_S)

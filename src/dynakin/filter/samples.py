@@ -86,9 +86,9 @@ def recording_arrays(recording: Recording, initial: CalibratedModel, *, gaps: bo
     return np.ascontiguousarray(markers), np.ascontiguousarray(wrench)
 
 
-def in_step(time: Array, wrench: Array, delay_s: float) -> Array:
-    """The wrench (T, 6), or a part of it, that belongs to each time (T,) s: what plates that lag by ``delay_s`` say
-    that much later.
+def in_step(time: Array, wrench: Array, delay_s: float | Array) -> Array:
+    """The wrench (T, 6), or a part of it, that belongs to each time (T,) s: what plates that lag by ``delay_s``, one or
+    (T,), say that much later.
 
     Linear between samples, NaN where one of them is, the last (or first) one held where the recording ends.
     """

@@ -16,9 +16,11 @@ from dynakin.filter.closure import Closure, closure
 from dynakin.filter.declared import bearing, may_bear, plate_of_its_own
 from dynakin.filter.expected import ContactPaths
 from dynakin.filter.plate_clock import Delay, clock_delay
+from dynakin.filter.plate_gain import NO_GAINS, found_gains
 from dynakin.filter.plate_motion import (
     Needed,
     brought_into_step,
+    drift_in_words,
     fitting_rate,
     hides_clock,
     out_of_step_in_words,
@@ -27,7 +29,7 @@ from dynakin.filter.plate_motion import (
     wrong_rate_in_words,
 )
 from dynakin.filter.shear import NO_SHEAR, Shear, found_shear, not_zeroed
-from dynakin.messages import Message, note, warning
+from dynakin.messages import Message, about, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
@@ -78,6 +80,7 @@ class Ground:
         usable: whether the plates are used at all.
         load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
         shear: by how much the plates' horizontal forces are off.
+        off_gain: (T, F) part of its load by which the plate under each foot may be off; None: nothing contradicts it.
         notes: what there is to say. reasons: those of them that say why something is not measured.
         behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how well that
             is known, where they were.
@@ -91,6 +94,7 @@ class Ground:
     notes: tuple[Message, ...]
     reasons: tuple[Message, ...]
     shear: Shear = NO_SHEAR
+    off_gain: Array | None = None
     behind_s: float = 0.0
     clock_sd_s: float = 0.0
 
@@ -132,12 +136,14 @@ def known_ground(
         RecordingError: the plates are refused.
     """
     ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance)
-    left = clock_delay(initial, recording.time, markers, known) if ground.loads is not None else None
+    left = None
+    if ground.loads is not None:
+        left = clock_delay(initial, recording.time, markers, known, drifts=not about(ground.notes, "carried"))
     if left is None and ground.loads is not None and ground.usable and not ground.behind_s and not initial.unseen_kg:
         ground = replace(ground, notes=(*ground.notes, note("sum of the plates", CLOCK_UNKNOWN)))
     if left is None or not left.worth_it:  # the coarse search's deviation gives way to the finer one's
         return (replace(ground, clock_sd_s=left.sd_s) if left is not None and ground.behind_s else ground), known
-    delay = Delay(ground.behind_s + left.delay_s, left.sd_s)
+    delay = left._replace(delay_s=ground.behind_s + left.delay_s)
     return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
 
 
@@ -180,7 +186,7 @@ def _known_ground(
         if loads is not None:  # the recording keeps its plates, with nobody on any
             loads = replace(loads, on=np.zeros((n, len(loads.feet), len(recording.plates)), dtype=bool))
         return replace(ground, loads=loads, notes=(*check.messages, *ground.notes)), nothing
-    by_motion, shear = list[Message](), NO_SHEAR
+    by_motion, shear, gains, righted = list[Message](), NO_SHEAR, NO_GAINS, None
     if taken is not None:
         by_motion.append(note("plates", _taken_in_words(taken, next(iter(initial.contacts)))))
     if loads is not None:
@@ -200,9 +206,13 @@ def _known_ground(
             by_motion.append(warning("carried", carried_in_words(load_kg)))
         elif not initial.contacts:
             shear = found_shear(needed, total)
-            by_motion += shear.notes
+            each = np.stack([initial.ground.wrench_to_ground(np.hstack([p.force, p.moment])) for p in recording.plates])
+            gains = found_gains(needed, recording.plates, each, loads.total_known)
+            righted = gains.righted(wrench, each)
+            by_motion += [*shear.notes, *gains.notes]
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
-    judged = _judged(recording, initial, markers, shear.zeroed(wrench), loads, check, may, by_plate, tolerance)
+    wrenches = [shear.zeroed(each) for each in (wrench, righted) if each is not None]
+    judged = _judged(recording, initial, markers, wrenches, loads, check, may, by_plate, tolerance)
     notes = [*by_motion, *check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
     reasons = [*judged.reasons]
     undeclared = judged.undeclared
@@ -218,7 +228,8 @@ def _known_ground(
         notes.append(note("plates", f"The total wrench is measured in {used} of {n} frames."))
     notes += reasons
     texts = tuple(notes), tuple(reasons)
-    return Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, *texts, shear), wrench
+    off_gain = None if loads is None or not gains.notes else gains.of_feet(loads)
+    return Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, *texts, shear, off_gain), wrench
 
 
 def _loads_of_feet(
@@ -282,14 +293,19 @@ def _judged(
     recording: Recording,
     initial: CalibratedModel,
     markers: Array,
-    wrench: Array,
+    wrenches: list[Array],
     loads: FootLoads | None,
     check: PlateCheck,
     may: Flags,
     by_plate: list[bool],
     tolerance: float | None,
 ) -> _Judged:
-    """Whether the plates carry what the motion needs, where feet and plates say that they carry the person."""
+    """Whether the plates carry what the motion needs, where feet and plates say that they carry the person.
+
+    Args:
+        wrenches: (T, 6) of all plates, and, where one is found to have another gain, the same without that.
+    """
+    wrench = wrenches[0]
     n, names, notes, reasons = recording.n_frames, list(initial.contacts), list[Message](), list[Message]()
     measured: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
     claimed = measured if loads is None else loads.total_known
@@ -305,7 +321,7 @@ def _judged(
     unmeasured = None if all(by_plate) else np.asarray(may.any(axis=1))
     pulling = [k for k, name in enumerate(names) if name != SEAT]
     pulls = None if unmeasured is None else np.asarray(may[:, pulling].any(axis=1))
-    found = closure(initial, recording.time, markers, wrench, claimed, unmeasured, pulls)
+    found, *without = [closure(initial, recording.time, markers, each, claimed, unmeasured, pulls) for each in wrenches]
     if found is None:
         flies = loads is not None and bool(loads.aloft.all(axis=1).any())  # which weighs nobody
         foreign = None if flies or names else _foreign_load(check, wrench, claimed, initial, tolerance)
@@ -318,8 +334,11 @@ def _judged(
         reasons.append(note("plates", _declared_in_words(found, bears, names, recording.time)))
         found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
     undeclared |= found.undeclared | _nearly_all(found)
-    if found.undeclared.any():
-        text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench)
+    if found.undeclared.any() and any(each is not None and not each.undeclared.any() for each in without):
+        words = f"In {np.count_nonzero(found.undeclared)} of {n} frames the plates' sum is not used because of that."
+        reasons.append(note("sum of the plates", words))
+    elif found.undeclared.any():
+        text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench, loads)
         reasons.append(text)
     if found.too_much is not None and loads is not None:
         undeclared |= claimed
@@ -366,12 +385,15 @@ def _brought_into_step(
     tolerance: float | None,
 ) -> tuple[Ground, Array]:
     """`known_ground` of what the plates say so much later, with a sentence on it."""
-    there = brought_into_step(recording, delay.delay_s)
+    there = brought_into_step(recording, delay.lags(recording.time) if delay.drift else delay.delay_s)
     wrench = initial.ground.wrench_to_ground(there.total_wrench())
     ground, known = _known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
-    words = f"{out_of_step_in_words(*delay)}; they were brought into step."
+    found = drift_in_words(delay, recording.time) if delay.drift else out_of_step_in_words(delay)
+    words = f"{found}; they were brought into step."
     said = note("in step", words)
-    if initial.unseen_kg:
+    if delay.drift:
+        said = warning("rate", f"{words} Correct the rate, or the times, in the file that is wrong.")
+    elif initial.unseen_kg:
         said = warning(
             "in step", f"{words} Not all of the body is marked, so that no better is known: synchronise both."
         )
@@ -400,9 +422,15 @@ def _declared_in_words(found: Closure, bears: Flags, names: list[str], time: Arr
 
 
 def _undeclared_in_words(
-    found: Closure, recording: Recording, initial: CalibratedModel, markers: Array, wrench: Array
+    found: Closure,
+    recording: Recording,
+    initial: CalibratedModel,
+    markers: Array,
+    wrench: Array,
+    loads: FootLoads | None,
 ) -> tuple[Message, Flags]:
-    """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts."""
+    """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts: what they have
+    too much is under a foot that stands alone (a load that somebody carries is between two)."""
     time, feet = recording.time, foot_markers(initial)
     beyond = np.zeros((len(time), len(feet)), dtype=bool)
     judged = np.isfinite(found.excess[:, 1])
@@ -447,7 +475,8 @@ def _undeclared_in_words(
             distance = distance_to_hull(place, markers[first:end][:, own][:, :, [0, 2]])
             if np.isfinite(distance).any():
                 away.append(float(np.nanmedian(distance)))
-                beyond[first:end, k] = sizes[-1][0] > 0.0 and away[-1] < NEAR_M
+                under = sizes[-1][0] > 0.0 or (loads is not None and _stands_alone(loads, k, slice(first, end)))
+                beyond[first:end, k] = under and away[-1] < NEAR_M
     size, axis = max(sizes, key=lambda pair: abs(pair[0]))
     near = f", {min(away):.2f} m or more from the feet" if away and not beyond.any() else ""
     return (
@@ -460,6 +489,12 @@ def _undeclared_in_words(
             f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The plates' sum is not used there.",
         )
     ), beyond
+
+
+def _stands_alone(loads: FootLoads, k: int, frames: slice) -> bool:
+    """Whether foot number k is the only one on a plate in most of the frames."""
+    standing: Flags = np.asarray(loads.on[frames].any(axis=2))
+    return bool((standing[:, k] & (standing.sum(axis=1) == 1)).mean() > 0.5)
 
 
 def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unseen_kg: float = 0.0) -> Message | None:

@@ -460,7 +460,7 @@ class Live:
             self._plate_motion = None
         elif asked.delay is not None:
             self.fusion.plates_behind_s += asked.delay.delay_s
-            self.say(f"{out_of_step_in_words(*asked.delay)}; from {time_s:.2f} s on they are brought into step.")
+            self.say(f"{out_of_step_in_words(asked.delay)}; from {time_s:.2f} s on they are brought into step.")
         if asked.mass is not None and not self._mass_doubted:
             self._mass_doubted = True
             self.say(asked.mass)

@@ -71,7 +71,7 @@ _KINDS = (
         "Export the markers without a filter (raw), and run them; of these use angles, and the moments of legs on "
         "plates.",
     ),
-    _Kind("Rate", ("rate",), "Look at which rate the cameras recorded, and whether the files say so."),
+    _Kind("Rate", ("rate",), "Look at which rates the cameras and the plates recorded, and whether the files say so."),
     _Kind(
         "Load in the hands",
         ("carried",),
@@ -87,7 +87,8 @@ _KINDS = (
     _Kind(
         "Plates' gain",
         ("gain",),
-        "Correct the calibration of the plates' horizontal channels (or its unit) in the file of the forces.",
+        "Correct the calibration (or the unit) of the channels named, in the file of the forces; if by the film "
+        "something else bears the person there, declare it (--contact).",
     ),
     _Kind(
         "Plates' place",

@@ -1,0 +1,157 @@
+"""A plate, or one of its sensors, whose gain is not that of the others, by the motion of the centre of mass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin import Estimator, Subject, load_model
+from dynakin.arrays import widened
+from dynakin.filter.contacts import carry
+from dynakin.filter.expected import plate_errors
+from dynakin.filter.plate_gain import SENSOR_M
+from dynakin.filter.prepared import Prepared
+from dynakin.messages import about
+from dynakin.recordings.feet.loads import MEASURED, UNKNOWN
+from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.simulation.trial import simulate as simulate_anew
+
+simulate = cache(simulate_anew)
+
+
+def person(mass_kg: float = 70.0) -> Estimator:
+    return Estimator(load_model("fullbody", Subject(mass_kg=mass_kg, height_m=1.75, sex="male")))
+
+
+def walk() -> Recording:
+    return simulate("fullbody", "gait", 7, 4.0).recording
+
+
+def with_plate(recording: Recording, which: int, change: Callable[[Plate], Plate]) -> Recording:
+    return recording.with_plates(tuple(change(p) if k == which else p for k, p in enumerate(recording.plates)))
+
+
+def scaled(part: float | Array) -> Callable[[Plate], Plate]:
+    """A plate with so much of all it says, where it presses as before."""
+    factor = np.reshape(part, (-1, 1))
+
+    def of(plate: Plate) -> Plate:
+        return replace(
+            plate, force=plate.force * factor, moment=plate.moment * factor, free_moment=plate.free_moment * factor
+        )
+
+    return of
+
+
+def said_of_gains(ready: Prepared) -> list[str]:
+    return [message.text for message in about(ready.messages, "gain")]
+
+
+@pytest.mark.parametrize("part", [0.9, 1.1])
+@pytest.mark.parametrize("mass_kg", [70.0, 73.0])
+def test_a_plate_of_another_gain_is_named_whatever_the_person_weighs(part: float, mass_kg: float) -> None:
+    recording = with_plate(walk(), 1, scaled(part))
+    ready, right = person(mass_kg).prepare(recording), person(mass_kg).prepare(walk())
+    (text,) = said_of_gains(ready)
+    assert "plate 2 has" in text and not said_of_gains(right) and right.ground.off_gain is None
+    assert float(text.split("plate 2 has ")[1].split()[0]) == pytest.approx(part, abs=0.02)
+    on = recording.plates[1].force[:, 1] > 20.0
+    assert ready.ground.off_gain is not None
+    assert ready.ground.off_gain[on].max(axis=1) == pytest.approx(abs(1.0 - 1.0 / part), abs=0.02)
+    assert not ready.ground.off_gain[~widened(on, 10)].any()
+    assert not any("something that no plate measures" in str(message) for message in ready.messages)
+
+
+def test_deviations_of_moments_hold_what_a_plate_is_off_by() -> None:
+    """Of the ankle and the knee over it."""
+    recording = with_plate(walk(), 1, scaled(1.06))
+    found, right = person().run(recording), person().run(walk())
+    on = recording.plates[1].force[:, 1] > 300.0
+    sides = ["ankle_angle_r", "ankle_angle_l", "knee_angle_r", "knee_angle_l"]
+    wrong, true, sd, usual = (
+        each.sel(coordinate=sides).values[on]
+        for each in (found.data["moments"], right.data["moments"], found.data["moments_sd"], right.data["moments_sd"])
+    )
+    off = np.abs(wrong - true)
+    assert np.nanmax(off) > 4.0 and (off < 2.0 * np.maximum(sd, 1.0))[np.isfinite(off)].all()
+    assert np.nanmax(sd) > 2.0 * np.nanmax(usual)
+
+
+def test_a_sensor_that_says_too_little_is_found_by_what_the_plate_lacks() -> None:
+    """A fifth of one of four: a twentieth of the load, and a centre of pressure that is off by a centimetre."""
+
+    def lacking(plate: Plate) -> Plate:
+        assert plate.corners is not None
+        middle, corner = plate.corners.mean(axis=0), plate.corners[0]
+        place = np.nan_to_num(plate.cop - middle)
+        half = corner - middle
+        share = 0.25 * (1.0 + place[:, 0] / half[0]) * (1.0 + place[:, 2] / half[2])
+        lost = 0.2 * share * plate.force[:, 1]
+        force, moment = plate.force.copy(), plate.moment.copy()
+        force[:, 1] -= lost
+        moment -= np.cross(corner, np.stack([0.0 * lost, lost, 0.0 * lost], axis=1))
+        return replace(plate, force=force, moment=moment)
+
+    (text,) = said_of_gains(person().prepare(with_plate(walk(), 1, lacking)))
+    assert "plate 2 has 0.9" in text
+
+
+def test_of_two_plates_nobody_knows_which_is_wrong(data_dir: Path) -> None:
+    folder = data_dir / "opencap_subject4"
+    recording = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    estimator = Estimator(load_model("fullbody", Subject(mass_kg=60.05, height_m=1.7, sex="female")))
+    assert not said_of_gains(estimator.prepare(recording))
+    ready = estimator.prepare(with_plate(recording, 0, scaled(1.1)))
+    (text,) = said_of_gains(ready)
+    one, other = (plate.name for plate in recording.plates)
+    assert f"{one} or {other}" in text or f"{other} or {one}" in text
+    assert ready.ground.off_gain is not None
+    both = np.stack([plate.force[:, 1] > 20.0 for plate in ready.recording.plates], axis=1).any(axis=1)
+    assert (ready.ground.off_gain[both].max(axis=1) > 0.05).mean() > 0.9
+
+
+@pytest.mark.parametrize("start_s", [0.9, 1.4, 1.9])
+def test_a_hand_that_holds_on_for_a_while_is_no_gain(start_s: float) -> None:
+    """A tenth of the weight, which does not follow a plate's load."""
+    recording = walk()
+    held = 0.1 * np.clip(np.minimum(recording.time - start_s, start_s + 0.4 - recording.time) / 0.05, 0.0, 1.0)
+    plates = tuple(scaled(1.0 - held)(plate) for plate in recording.plates)
+    assert not said_of_gains(person().prepare(recording.with_plates(plates)))
+
+
+def test_what_a_gain_is_off_by_is_all_of_the_load_or_one_sensors() -> None:
+    place = np.array([1.0, 0.0, 0.3])
+    force = np.array([0.0, 800.0, 60.0])
+    wrench = np.concatenate([force, np.cross(place, force)])
+    there = carry(-place)
+    sd = np.sqrt(np.diag(there @ plate_errors(wrench[None], place[None], off_gain=0.1)[0] @ there.T))
+    np.testing.assert_allclose(sd[1], 80.0, rtol=0.02)
+    np.testing.assert_allclose(sd[3:], 80.0 * SENSOR_M, rtol=0.02)
+    np.testing.assert_allclose(sd[[0, 2]], np.hypot(np.hypot(2.0, 4.0), 6.0), rtol=1e-6)
+
+
+@pytest.mark.parametrize("too_much_n", [150.0, 220.0])
+def test_a_foot_alone_on_a_plate_that_says_too_much_is_not_measured_meanwhile(too_much_n: float) -> None:
+    """For 0.3 s, where the foot presses: no gain, and nothing that bears elsewhere."""
+    recording = walk()
+    on = np.flatnonzero(recording.plates[1].force[:, 1] > 300.0)
+    middle = recording.time[on].mean()
+    more = too_much_n * (np.abs(recording.time - middle) < 0.15)
+
+    def pushed(plate: Plate) -> Plate:
+        force = plate.force + np.stack([0.0 * more, more, 0.0 * more], axis=1)
+        return replace(plate, force=force, moment=np.cross(np.nan_to_num(plate.cop), force) + plate.free_moment)
+
+    ready, right = person().prepare(with_plate(recording, 1, pushed)), person().prepare(recording)
+    loads, before = ready.ground.loads, right.ground.loads
+    assert loads is not None and before is not None and not said_of_gains(ready)
+    stands = loads.on[:, :, 1] & (more > 0.0)[:, None]
+    assert (before.reason[stands] == MEASURED).all() and (loads.reason[stands] == UNKNOWN).mean() > 0.9
+    other = loads.on[:, :, [0, 2]].any(axis=2) & ~loads.on[:, :, 1]
+    assert (loads.reason[other] == before.reason[other]).mean() > 0.95
