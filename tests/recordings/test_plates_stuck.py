@@ -151,6 +151,7 @@ def test_frozen_samples_of_a_c3d_are_not_measured(tmp_path: Path) -> None:
 def test_plates_that_share_channels_are_named(second: list[int], shared: bool) -> None:
     listed = {"CHANNEL": {"value": np.array([[1, 2, 3, 4, 5, 6], second]).T}, "TYPE": {"value": [2, 2]}}
     said = shared_channels(Parameters({"FORCE_PLATFORM": listed}), [0, 1])
-    assert [each.text.startswith("plate 2 lists the analog channels of plate 1 (numbers 3, 4 ") for each in said] == (
-        [True] if shared else []
-    )
+    assert list(said) == (["plate 2"] if shared else [])
+    for others, each in said.values():
+        assert others == ["plate 1"]
+        assert each.text.startswith("plate 2 lists the analog channels of plate 1 (numbers 3, 4 ")

@@ -90,6 +90,11 @@ _KINDS = (
         "Correct the calibration of the plates' horizontal channels (or its unit) in the file of the forces.",
     ),
     _Kind(
+        "Plates' horizontal forces",
+        ("vertical only",),
+        "Export the horizontal forces as well, or record with plates that measure them.",
+    ),
+    _Kind(
         "Plates' place",
         ("place",),
         "Correct where the file has the plates (corners, origin, centres of pressure), or declare what else steadies "
