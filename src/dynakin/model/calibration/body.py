@@ -77,12 +77,10 @@ def find_mass(
             continue
         loads = foot_loads(recording, ground, foot_markers)
         check = check_plates(recording, ground, None, foot_markers, loads)
-        total = np.sum([plate.force for plate in recording.plates], axis=0)
-        load = while_loaded(ground.vectors_to_ground(total)[:, 1])
         if check.refusal is not None:
             refused = True
             reasons.append(f"{recording.plates_file}: {check.refusal}")
-        elif load < JUDGED_N and (unit := likely_unit(load)):
+        elif unit := _other_unit(recording, ground):
             refused = True
             reasons.append(f"{recording.plates_file}: {CONVERT.format(unit).replace('The', 'the', 1)}")
         elif check.mass_kg_from_plates is None:
@@ -122,6 +120,13 @@ def find_mass(
         f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); {action}",
         asks_for="mass_kg",
     )
+
+
+def _other_unit(recording: Recording, ground: GroundFrame) -> str:
+    """In which unit plates may be that carry next to nothing as N; "" where in none."""
+    total = np.sum([plate.force for plate in recording.plates], axis=0)
+    push = ground.vectors_to_ground(total)[:, 1]
+    return likely_unit(while_loaded(push)) if 0.0 < np.nan_to_num(push).max(initial=0.0) < JUDGED_N else ""
 
 
 def impulse_load(
