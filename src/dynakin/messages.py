@@ -23,6 +23,7 @@ Topic = Literal[
     "weight",  # plates beside the mass
     "zero",  # plates that push sideways all the time
     "gain",  # plates whose forces are too large or small
+    "vertical only",  # plates that measure no horizontal force
     "carried",  # what is in the hands
     "marker set",  # which one was chosen
     "labels",  # markers that are not where their names say

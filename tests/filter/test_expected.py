@@ -19,6 +19,7 @@ from dynakin.filter.expected import (
     foot_prior,
     plate_errors,
 )
+from dynakin.filter.shear import Shear
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
 from dynakin.recordings.feet.soles import Soles
@@ -230,6 +231,31 @@ def test_the_parts_of_a_shared_plate_are_the_prior_given_their_sum(shared_n: flo
     of_sum = H @ given @ H.T
     assert (np.diag(of_sum) <= np.diag(plate) * (1.0 + 1e-9)).all()
     assert np.sqrt(given[1, 1]) > 3.0 * np.sqrt(of_sum[1, 1])  # the division is not
+
+
+def test_a_plate_of_the_vertical_force_alone_leaves_the_rest_to_the_prior() -> None:
+    """Against dense conditioning of the foot's prior on push and centre of pressure alone."""
+    loads, t = make_believe(), 1  # right on its plate, left off it
+    place = PRESSURE[0] + [0.02, 0.0, -0.01]
+    loads.wrench[t, 0] = plate_wrench(410.0, place, (0.0, 0.0)) - [0.0, 0.0, 0.0, 0.0, 2.0, 0.0]
+    n = len(REASONS)
+    found = expected_loads(
+        loads, person(), NOISE, np.tile(ROOT, (n, 1, 1)), np.zeros(n, bool), np.zeros((n, 0), bool),
+        Shear(unmeasured=True),
+    )  # fmt: skip
+    assert found.contact[t].tolist()[:2] == [UNMEASURED, UNMEASURED]
+    prior = foot_prior(loads, 0, WEIGHT, np.tile(ROOT, (n, 1)), np.zeros(n, bool))
+    P, there = prior.spread[t] @ prior.spread[t].T, carry(-place)
+    H, R = there[[1, 3, 5]], np.diag(np.hypot([2.0, 0.5, 0.5], [4.1, 0.82, 0.82])) ** 2
+    K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
+    mean = prior.mean[t] + K @ (H @ (loads.wrench[t, 0] - prior.mean[t]))
+    np.testing.assert_allclose(found.wrench[t, 0], mean, atol=0.05)
+    spread = found.effects[t][:, :6] @ found.effects[t][:, :6].T
+    np.testing.assert_allclose(spread, P - K @ H @ P, atol=1e-3 * np.abs(P).max())
+    said = np.sqrt(np.diag(there @ spread @ there.T))
+    assert said[1] < 5.0 and (said[[0, 2]] > 40.0).all()  # the push is the plate's, shear is not
+    assert found.contact[3, :2].tolist() == [SHARED_PLATE, SHARED_PLATE]
+    assert np.isfinite(found.wrench).all() and np.linalg.eigvalsh(found.covariance).min() > -1e-3
 
 
 def test_in_undeclared_frames_the_root_may_bear_anything_and_the_total_is_not_known() -> None:

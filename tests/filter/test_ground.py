@@ -15,12 +15,15 @@ import pytest
 import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.cli.prepared import assumed
+from dynakin.errors import RecordingError
 from dynakin.filter.closure import closure
 from dynakin.filter.impossible import impossible
 from dynakin.filter.sources import with_sources
 from dynakin.filter.total_wrench import Ground
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
+from dynakin.recordings.feet.loads import MEASURED as FOOT_MEASURED
+from dynakin.recordings.feet.loads import SHARED as FOOT_SHARED
 from dynakin.recordings.feet.loads import SWING
 from dynakin.recordings.feet.loads import UNKNOWN as FOOT_UNKNOWN
 from dynakin.recordings.formats.mot import read_table
@@ -365,8 +368,48 @@ def test_plates_of_twice_the_scale_give_no_moments() -> None:
     )
     assert found.loads is not None
     assert not found.loads.total_known.any()
+    assert not np.isin(found.loads.reason, [FOOT_MEASURED, FOOT_SHARED]).any() and found.undeclared.all()
     right = ground_of(whole, person("fullbody"))
     assert not any("their scale" in text for text in map(str, right.reasons))
+
+
+def vertical_alone(plate: Plate) -> Plate:
+    """What a plate that measures the vertical force and where it presses says, the laboratory's y up."""
+    force = plate.force * [0.0, 1.0, 0.0]
+    moment = np.cross(np.nan_to_num(plate.cop), force)
+    return replace(plate, force=force, moment=moment, free_moment=np.zeros_like(force))
+
+
+def test_of_plates_that_measure_the_vertical_force_alone_no_leg_is_measured() -> None:
+    """The deviations of what is derived instead hold what plates say that measure all of it."""
+    recording = simulate("fullbody", "gait", 5, 4.0, 50.0).recording
+    estimator = person("fullbody")
+    whole = estimator.run(recording)
+    found = estimator.run(recording.with_plates(tuple(vertical_alone(plate) for plate in recording.plates)))
+    assert [m.level for m in found.messages if m.topic == "vertical only"] == ["warning"]
+    assert any(i.title == "Plates' horizontal forces" for i in insights(found, compute_metrics(found)))
+    assert not any(m.topic == "vertical only" for m in whole.messages)
+    assert np.isnan(found.data["wrench_measured"].values).all()
+    for k, side in enumerate("rl"):
+        on = whole.data["foot_contact"].values[:, k] == ON_PLATE
+        assert on.sum() > 20 and np.isnan(found.data["foot_wrench_measured"].values[on, k]).all()
+        push, measured = (each.data["foot_wrench"].values[on, k, 1] for each in (found, whole))
+        assert np.sqrt(np.mean((push - measured) ** 2)) < 0.03 * WEIGHT  # of which they are of use
+        for joint in ("hip_flexion", "knee_angle", "ankle_angle"):
+            name = f"{joint}_{side}"
+            assert (sources(whole, name)[on] == MEASURED).all() and (sources(found, name)[on] != MEASURED).all()
+            moment, sd, reference = (
+                each.sel(coordinate=name).values[on]
+                for each in (found.data["moments"], found.data["moments_sd"], whole.data["moments"])
+            )
+            assert np.mean(np.abs(moment - reference) < 1.96 * sd) > 0.9
+
+
+def test_a_model_that_takes_all_of_the_force_refuses_the_vertical_one_alone() -> None:
+    recording = simulate("sagittal7", "squat", 11, 12.0).recording
+    plates = tuple(vertical_alone(plate) for plate in recording.plates)
+    with pytest.raises(RecordingError, match="measure the vertical force only"):
+        ground_of(recording.with_plates(plates), person("sagittal7"))
 
 
 def test_a_pause_in_the_times_is_no_seat() -> None:

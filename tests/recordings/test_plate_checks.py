@@ -10,13 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynakin.errors import RecordingError
+from dynakin.errors import ModelError, RecordingError
+from dynakin.model.calibration.body import find_mass
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.recording import Recording
+from dynakin.settings.subject import Subject
+from dynakin.units import GRAVITY_M_S2
 from support.made_recordings import standing, unseen
 
 FEET = {"left": ["LHEE", "LTOE"], "right": ["RHEE", "RTOE"]}
@@ -51,7 +54,11 @@ def test_another_mass_is_a_warning_with_numbers() -> None:
 @pytest.mark.parametrize(
     ("recording", "mass", "words"),
     [
-        (standing(70.0, sign=-1.0), None, ["vertical force is -686.5 N", "expected a positive one"]),
+        (
+            standing(70.0, sign=-1.0),
+            None,
+            ["vertical force is -686.5 N", "expected a positive one", "turn the signs of"],
+        ),
         (
             standing(70.0, cop_shift_m=0.9),
             None,
@@ -68,6 +75,26 @@ def test_refusals_give_the_number(recording: Recording, mass: float | None, word
     assert found.refusal is not None
     for word in words:
         assert word in found.refusal
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [
+        (-1.0, "turn the signs of all forces"),
+        (1.0 / 70.0, "N per kg of body mass"),
+        (1.0 / (70.0 * GRAVITY_M_S2), "body weights"),
+        (0.001, "kN"),
+    ],
+)
+def test_where_the_mass_is_missing_forces_of_another_sign_or_unit_are_what_is_to_be_corrected(
+    factor: float, words: str
+) -> None:
+    made = standing(70.0)
+    plates = tuple(replace(p, force=factor * p.force, moment=factor * p.moment) for p in made.plates)
+    trial = made.with_plates(plates)
+    with pytest.raises(ModelError, match=words) as refused:
+        find_mass(Subject(), [(trial, find_ground_frame(made, vertical="+Y"))], FEET, [], None)
+    assert "correct the forces first" in refused.value.message
 
 
 @pytest.mark.parametrize(("shift_m", "warned"), [(1.5, False), (0.0, True), (None, True)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from dynakin.messages import warnings_of
 from dynakin.recordings.formats.c3d import read_c3d
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plates import shared_channels
-from dynakin.recordings.plates.stuck import frozen, without_dead_channels
+from dynakin.recordings.plates.doubles import without_doubles
+from dynakin.recordings.plates.stuck import frozen, vertical_only, without_dead_channels
 from dynakin.recordings.recording import Plate, Recording
 from support.made_recordings import write_c3d
 
@@ -86,6 +88,59 @@ def test_a_centre_of_pressure_that_moves_along_one_axis_on_no_plate_is_that_of_a
     assert without_dead_channels(made) is made
 
 
+def tilted(plate: Plate) -> Plate:
+    """All of its force along an axis that is not quite vertical."""
+    return pressed("tilted", plate.force[:, [1]] * [0.002, 1.0, -0.001], np.nan_to_num(plate.cop))
+
+
+@pytest.mark.parametrize(
+    ("plates", "alone"),
+    [
+        (tuple(edited(step(at), force={0: 0.0, 2: 0.0}) for at in (0.2, 0.9)), True),
+        (tuple(edited(step(at), force={0: 2.0, 2: -1.0}) for at in (0.2, 0.9)), True),  # an amplifier's zero
+        ((tilted(step(0.2)), tilted(GOOD)), True),
+        ((edited(step(0.2), force={0: 0.0, 2: 0.0}), GOOD), False),  # one that has none is a dead channel's
+        (tuple(edited(step(at), force={2: 0.0}, cop={2: 0.1}) for at in (0.2, 0.9)), False),  # in a plane
+        ((pressed("still", np.tile([0.0, 700.0, 0.0], (N, 1)), np.full((N, 3), 0.1)),), False),  # made up
+        ((pressed("empty", np.zeros((N, 3)), np.zeros((N, 3))),), False),
+        ((), False),
+    ],
+)
+def test_plates_that_measure_the_vertical_force_alone_are_known(plates: tuple[Plate, ...], alone: bool) -> None:
+    assert vertical_only(recorded(*plates)) is alone
+
+
+def at(plate: Plate, name: str, moved: float = 0.0) -> Plate:
+    place = np.nan_to_num(plate.cop) + np.array([moved, 0.0, 0.0])
+    return replace(pressed("", plate.force, place), name=name)
+
+
+def test_a_plate_that_is_listed_twice_is_one() -> None:
+    first = at(GOOD, "plate 1")
+    found = without_doubles(recorded(first, at(step(0.2), "plate 2"), at(GOOD, "plate 3")))
+    assert [plate.name for plate in found.plates] == ["plate 1", "plate 2"] and found.plates[0] is first
+    (said,) = warnings_of(found.notes)
+    assert said.text.startswith("plate 1 and plate 3 hold the same forces in every row, at the same place")
+    assert "plate 3 is left out" in said.text
+
+
+def test_the_same_rows_at_different_places_are_measured_at_none() -> None:
+    other = at(step(0.2), "plate 2")
+    found = without_doubles(recorded(at(GOOD, "plate 1"), other, at(GOOD, "plate 3", moved=0.5)))
+    assert np.isnan(found.plates[0].force).all() and np.isnan(found.plates[2].force).all()
+    assert found.plates[1] is other
+    (said,) = warnings_of(found.notes)
+    assert "plate 1 and plate 3" in said.text and "Neither is measured" in said.text
+
+
+def test_plates_with_loads_of_their_own_or_none_are_no_doubles() -> None:
+    noisy = at(GOOD, "plate 3")
+    noisy = replace(noisy, force=noisy.force + np.random.default_rng(1).normal(0.0, 0.1, noisy.force.shape))
+    empty = [pressed(f"plate {k}", np.zeros((N, 3)), np.zeros((N, 3))) for k in (4, 5)]
+    made = recorded(at(GOOD, "plate 1"), at(step(0.2), "plate 2"), noisy, *empty)
+    assert without_doubles(made) is made
+
+
 def rows() -> np.ndarray:
     return np.hstack([GOOD.force, GOOD.moment])
 
@@ -151,6 +206,7 @@ def test_frozen_samples_of_a_c3d_are_not_measured(tmp_path: Path) -> None:
 def test_plates_that_share_channels_are_named(second: list[int], shared: bool) -> None:
     listed = {"CHANNEL": {"value": np.array([[1, 2, 3, 4, 5, 6], second]).T}, "TYPE": {"value": [2, 2]}}
     said = shared_channels(Parameters({"FORCE_PLATFORM": listed}), [0, 1])
-    assert [each.text.startswith("plate 2 lists the analog channels of plate 1 (numbers 3, 4 ") for each in said] == (
-        [True] if shared else []
-    )
+    assert list(said) == (["plate 2"] if shared else [])
+    for others, each in said.values():
+        assert others == ["plate 1"]
+        assert each.text.startswith("plate 2 lists the analog channels of plate 1 (numbers 3, 4 ")

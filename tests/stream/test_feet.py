@@ -209,9 +209,9 @@ class Standing:
             x, z = FootShape.of(own, forward).middle(own)[0]
             self.middles.append(np.array([x, 0.0, z]))
 
-    def look(self, push: float, point: np.ndarray) -> tuple[ContactLoads, bool]:
-        """A vertical force in N at a point of the ground frame."""
-        force, ground = np.array([0.0, push, 0.0]), self.initial.ground
+    def look(self, push: float, point: np.ndarray, sideways: float = 0.1) -> tuple[ContactLoads, bool]:
+        """A vertical force in N at a point of the ground frame, and a plate's noise beside it."""
+        force, ground = np.array([sideways, push, 0.0]), self.initial.ground
         wrench = np.concatenate([force, np.cross(point * [1.0, 0.0, 1.0], force)])
         to_ground = ground.wrench_to_ground(np.eye(6)).T
         self.frame += 1
@@ -256,6 +256,17 @@ def test_a_foot_beside_the_plate_is_not_measured(trial: SimulatedTrial) -> None:
     person.feet = LiveFeet(person.initial, presets.default(), ("one",), {"one": "left"})  # the user knows better
     found, known = person.look(350.0, person.middles[0])
     assert not known and found.contact.tolist() == [[UNMEASURED, ON_PLATE, ON_PLATE]]
+
+
+def test_a_plate_without_horizontal_force_does_not_measure_the_foot_until_it_shows_one(trial: SimulatedTrial) -> None:
+    person = Standing(trial)
+    found, known = person.look(350.0, person.middles[0], sideways=0.0)
+    assert not known and found.contact.tolist() == [[UNMEASURED, UNMEASURED, ON_PLATE]]
+    assert found.wrench[0, 0, 1] == pytest.approx(350.0, abs=10.0)  # the push is the plate's
+    assert any("the vertical force only" in text for text in person.feet.news())
+    for sideways in (0.1, 0.0):  # a zero among others is a force
+        found, _ = person.look(350.0, person.middles[0], sideways=sideways)
+        assert found.contact.tolist() == [[ON_PLATE, UNMEASURED, ON_PLATE]]
 
 
 def test_a_foot_that_takes_over_load_may_have_done_so_earlier_or_later(

@@ -114,6 +114,8 @@ def expected_loads(
             wrench[:, k] = filled(measured)
     wrench[:, :K][contact == NO_CONTACT] = 0.0
     errors, effects = np.zeros((frames, K + 1, 6, K + 1, 6)), np.zeros((frames, 6, K, 6))
+    partly = (contact == ON_PLATE) & shear.unmeasured  # the rest of such a wrench is as little known as off the plates
+    contact[partly] = UNMEASURED
     unmeasured = contact == UNMEASURED
     alone = unmeasured.sum(axis=1) == 1
     priors: dict[int, Prior] = {}
@@ -129,11 +131,17 @@ def expected_loads(
         if not (off | (contact[:, k] == SHARED_PLATE)).any():
             continue  # nobody asks for its prior
         if k < F:
-            prior = foot_prior(loads, k, weight, root, alone)
+            prior = foot_prior(loads, k, weight, root, alone, np.where(partly[:, k], wrench[:, k, 1], 0.0))
         else:
             prior = declared_prior(list(initial.contacts)[k - F], weight, paths[:, 1 + k - F])
         priors[k] = prior
-        wrench[off, k], effects[off, :, k] = prior.mean[off], prior.spread[off]
+        wrench[off & ~partly[:, k], k] = prior.mean[off & ~partly[:, k]]
+        effects[off, :, k] = prior.spread[off]
+        if partly[:, k].any():
+            on = partly[:, k]
+            wrench[on, k], effects[on, :, k] = _given_plate(
+                Prior(prior.mean[on], prior.spread[on]), wrench[on, k], errors[on, k, :, k]
+            )
         errors[off, k, :, k] = _about(root[off], np.array([_WHITE_N] * 3 + [_WHITE_NM] * 3))
     for t in np.flatnonzero((contact == SHARED_PLATE).any(axis=1)):
         _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors, places, shear, gains)
@@ -175,11 +183,24 @@ def plate_errors(wrench: Array, contact: Array, off: Shear = NO_SHEAR, off_gain:
     shear = np.hypot(shear, off_gain * np.hypot(wrench[:, 0], wrench[:, 2]))
     lift = np.hypot(PLATE_NOISE_N, np.hypot(PLATE_GAIN, off_gain) * push)
     moment = np.hypot(PLATE_NOISE_NM, np.hypot(PLATE_PLACE_M, SENSOR_M * off_gain) * push)
-    return _about(pressure, np.stack([shear, lift, shear, moment, moment, moment], axis=1))
+    twist = shear if off.unmeasured else moment
+    return _about(pressure, np.stack([shear, lift, shear, moment, twist, moment], axis=1))
 
 
-def foot_prior(loads: FootLoads, k: int, weight: float, root: Array, alone: Flags) -> Prior:
-    """Of foot number k, by its sole and its stance; alone (T,): it is the only contact that no plate measures.
+def _given_plate(prior: Prior, wrench: Array, errors: Array) -> Prior:
+    """A prior (T,), given what a plate says of its wrench (T, 6) with errors of covariances (T, 6, 6). The six numbers
+    stay those of the prior as far as the plate leaves them open, so that they last from frame to frame."""
+    S = prior.spread
+    seen = np.swapaxes(np.linalg.solve(errors, S), 1, 2)  # S' R^-1
+    factor = np.linalg.cholesky(np.eye(6) + seen @ S)
+    spread = np.swapaxes(np.linalg.solve(factor, np.swapaxes(S, 1, 2)), 1, 2)
+    told = np.linalg.solve(errors, (wrench - prior.mean)[..., None])
+    return Prior(prior.mean + (spread @ (np.swapaxes(spread, 1, 2) @ told))[..., 0], spread)
+
+
+def foot_prior(loads: FootLoads, k: int, weight: float, root: Array, alone: Flags, push: Array | float = 0.0) -> Prior:
+    """Of foot number k, by its sole and its stance; alone (T,): it is the only contact that no plate measures; push
+    (T,) N: what it is known to bear, by which shear and moments go where that is more than expected.
 
     The six numbers are, in order: shear along X; push, along the line from the centre of pressure to over the root;
     shear along Z; the two coordinates of the centre of pressure, with the free moment between them.
@@ -193,7 +214,7 @@ def foot_prior(loads: FootLoads, k: int, weight: float, root: Array, alone: Flag
     direction = np.concatenate([to_root / np.maximum(to_root[:, [1]], _LEAST_HEIGHT_M), np.zeros_like(root)], axis=1)
     direction[:, 1] = 1.0
     load = weight * (PUSH_LEAST_SD + PUSH_SD * stance) / (PUSH_LEAST_SD + PUSH_SD)  # the weight, in full stance
-    load *= np.where(alone, ALONE_LOAD, 1.0)
+    load = np.maximum(load * np.where(alone, ALONE_LOAD, 1.0), push)
     push_sd = weight * (PUSH_LEAST_SD + np.where(alone, ALONE_SD, PUSH_SD) * stance)
     push_sd = np.hypot(push_sd, weight * HANDED_OVER_S * soles.passing[:, k])
     spread = np.zeros((len(root), 6, 6))

@@ -7,6 +7,7 @@ by accelerations and inertia. Newton's second law in every frame is enough to kn
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from itertools import product
 from typing import NamedTuple
@@ -93,6 +94,19 @@ class Needed:
         self.whole, self.root = not initial.unseen_kg, root_path(initial, markers)
         self.known: Flags = np.zeros(len(time), dtype=bool) if found is None else found.known
         self.force = np.zeros((len(time), 3)) if found is None else found.needed_force(initial.weighed_kg)
+
+    def vertically(self) -> Needed:
+        """The same, for delays that are judged by the vertical force alone, as of a body whose trunk no marker
+        shows."""
+        other = copy(self)
+        other.whole = False
+        return other
+
+    def with_horizontal(self, wrench: Array) -> Array:
+        """Wrenches (T, 6) whose horizontal force, which is not measured, is what the motion needs."""
+        found = wrench.copy()
+        found[:, [0, 2]] = np.where(self.known[:, None], self.force[:, [0, 2]], 0.0)
+        return found
 
     def judged(self, force: Array) -> Flags:
         """(T,) frames in which both this and forces (T, 3) are known."""

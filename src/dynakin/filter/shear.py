@@ -1,4 +1,4 @@
-"""Plates whose horizontal forces are wrong all the time: not zeroed, or of another gain."""
+"""Plates whose horizontal forces are wrong all the time: not zeroed, of another gain, or not measured at all."""
 
 from __future__ import annotations
 
@@ -25,20 +25,26 @@ skin is in the motion), which chose, real ones 0.86 to 1.11, other simulated one
 VIGOROUS, FOLLOWS = 0.03, 0.95
 """What it takes to tell it: what the motion needs varies by this part of the weight (standard deviation; squats have
 0.016), and the force follows it (correlation)."""
+ANY_N = 1e4
+"""Deviation, N (N m of the moment about the vertical), of what is not measured: any that a person makes, and little
+enough to be inverted beside a plate's noise."""
 
 
 @dataclass(frozen=True)
 class Shear:
     """By how much the plates' horizontal forces are off: zero, N, X and Z of the ground, of their sum; off_gain, part
-    of any. notes: what there is to say."""
+    of any. unmeasured: no plate measures them, nor the moment about the vertical. notes: what there is to say."""
 
     zero: tuple[float, float] = (0.0, 0.0)
     off_gain: float = 0.0
+    unmeasured: bool = False
     notes: tuple[Message, ...] = ()
 
     def sd(self, wrench: Array) -> Array:
         """(T,) N, of each horizontal component of a plate's wrench (T, 6), because any may have all of the zero; 0
         where nothing bears on it."""
+        if self.unmeasured:
+            return np.full(len(wrench), ANY_N)
         sd = np.hypot(np.hypot(*self.zero), self.off_gain * np.hypot(wrench[:, 0], wrench[:, 2]))
         return np.where(wrench[:, 1] > 0.0, sd, 0.0)
 
@@ -49,6 +55,12 @@ class Shear:
 
 NO_SHEAR = Shear()
 """Nothing is off."""
+VERTICAL_ONLY = warning(
+    "vertical only",
+    "the plates measure the vertical force only: their horizontal forces are 0 or follow it, whatever the person does. "
+    "Horizontal forces, and moments of the legs that rest on them, are those of the motion and not measured.",
+)
+"""What there is to say of plates with `Shear.unmeasured`."""
 
 
 def found_shear(needed: Needed, force: Array) -> Shear:
@@ -69,7 +81,7 @@ def found_shear(needed: Needed, force: Array) -> Shear:
         )
         notes.append(warning("gain", text))
     off = (0.0, 0.0) if zero is None else (float(zero[0]), float(zero[1]))
-    return Shear(off, 0.0 if gain is None else abs(1.0 - 1.0 / gain), tuple(notes))
+    return Shear(off, 0.0 if gain is None else abs(1.0 - 1.0 / gain), notes=tuple(notes))
 
 
 def not_zeroed(x: float, z: float, weight: float) -> str:

@@ -28,7 +28,7 @@ from dynakin.filter.plate_motion import (
     turned_axes,
     wrong_rate_in_words,
 )
-from dynakin.filter.shear import NO_SHEAR, Shear, found_shear, not_zeroed
+from dynakin.filter.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
@@ -40,6 +40,7 @@ from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.plates.stuck import vertical_only
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.weight import likely_unit
 from dynakin.settings.contacts import SEAT
@@ -186,15 +187,23 @@ def _known_ground(
         if loads is not None:  # the recording keeps its plates, with nobody on any
             loads = replace(loads, on=np.zeros((n, len(loads.feet), len(recording.plates)), dtype=bool))
         return replace(ground, loads=loads, notes=(*check.messages, *ground.notes)), nothing
-    by_motion, shear, gains, righted = list[Message](), NO_SHEAR, NO_GAINS, None
+    by_motion, gains, righted = list[Message](), NO_GAINS, None
+    shear = Shear(unmeasured=True) if vertical_only(recording) else NO_SHEAR
+    if shear.unmeasured and loads is None:
+        raise RecordingError(
+            f"{recording.plates_file}: the plates measure the vertical force only (horizontal forces are 0, or follow "
+            "it), and this model takes all of the force: export the horizontal forces as well"
+        )
     if taken is not None:
         by_motion.append(note("plates", _taken_in_words(taken, next(iter(initial.contacts)))))
+    all_of_it = wrench
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
-        if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
+        all_of_it = needed.with_horizontal(wrench) if shear.unmeasured else wrench
+        if not shear.unmeasured and (wrong := turned_axes(needed, recording.plates, initial, loads.total_known)):
             raise RecordingError(f"{recording.plates_file}: {wrong}")
-        total = np.where(loads.total_known[:, None], wrench[:, :3], np.nan)
-        delay = None if in_step else plates_delay(needed, total)
+        total = np.where(loads.total_known[:, None], all_of_it[:, :3], np.nan)
+        delay = None if in_step else plates_delay(needed.vertically() if shear.unmeasured else needed, total)
         if delay is not None:
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
         if not in_step and hides_clock(needed, total):
@@ -204,24 +213,24 @@ def _known_ground(
             by_motion.append(warning("rate", wrong_rate_in_words(needed.rate, *found)))
         elif not initial.contacts and (load_kg := carried_in_hands(needed, initial, markers, total)) is not None:
             by_motion.append(warning("carried", carried_in_words(load_kg)))
-        elif not initial.contacts:
+        elif not initial.contacts and not shear.unmeasured:
             shear = found_shear(needed, total)
             each = np.stack([initial.ground.wrench_to_ground(np.hstack([p.force, p.moment])) for p in recording.plates])
             gains = found_gains(needed, recording.plates, each, loads.total_known)
             righted = gains.righted(wrench, each)
             by_motion += [*shear.notes, *gains.notes]
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
-    wrenches = [shear.zeroed(each) for each in (wrench, righted) if each is not None]
+    wrenches = [shear.zeroed(each) for each in (all_of_it, righted) if each is not None]
     judged = _judged(recording, initial, markers, wrenches, loads, check, may, by_plate, tolerance)
     notes = [*by_motion, *check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
-    reasons = [*judged.reasons]
+    reasons = [*([VERTICAL_ONLY] if shear.unmeasured else []), *judged.reasons]
     undeclared = judged.undeclared
     if loads is not None:
         before = loads
         loads = loads.with_borne(np.asarray(judged.bears.any(axis=1))).with_undeclared(undeclared)
         loads = loads.without(judged.beyond)
         reasons += _light_feet(before, loads, judged.beyond)
-    partly = undeclared if loads is None else ~loads.total_known
+    partly = undeclared if loads is None else ~loads.total_known | shear.unmeasured
     wrench = np.where(partly[:, None], np.nan, wrench)
     used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
     if loads is not None or used < n:
@@ -340,15 +349,14 @@ def _judged(
     elif found.undeclared.any():
         text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench, loads)
         reasons.append(text)
-    if found.too_much is not None and loads is not None:
-        undeclared |= claimed
-        beyond = beyond | claimed[:, None]
+    if found.too_much is not None and loads is not None:  # where the other foot is off the plates, too
+        undeclared[:], beyond[:] = True, True
         reasons.append(
             warning(
                 "weight",
                 f"the plates carry {found.too_much:.2f} times what the motion needs of "
                 f"{initial.weighed_kg:.1f} kg, all the time: their scale or the mass is wrong, or a load is not "
-                "declared. No moment of the legs is given there. Check the plates' units, --mass, and [[loads]].",
+                "declared. No moment of the legs is given. Check the plates' units, --mass, and [[loads]].",
             )
         )
     if found.unjudged > MANY * n:

@@ -18,6 +18,7 @@ from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table, read_table
 from dynakin.recordings.formats.textfile import first_cell, refuse_export
 from dynakin.recordings.formats.trc import read_trc
+from dynakin.recordings.plates.doubles import without_doubles
 from dynakin.recordings.plates.filtered import cuts_into_loads
 from dynakin.recordings.plates.stuck import without_dead_channels
 from dynakin.recordings.recording import Recording
@@ -98,7 +99,7 @@ def read(
         "force_threshold_n": force_threshold_n,
     }
     known = {key: value for key, value in asked.items() if value is not None}
-    return without_dead_channels(replace(recording, read_with=known) if known else recording)
+    return without_dead_channels(without_doubles(replace(recording, read_with=known) if known else recording))
 
 
 def _check_unit(recording: Recording, path: Path) -> None:

@@ -34,7 +34,10 @@ TILT_WARNING_DEG = 10.0
 def likely_unit(load: float, mass_kg: float | None = None) -> str:
     """In which other unit a person's mean load of so many "N" may be; "" where it is that of none."""
     units = [("body weights", 1.0), ("N per kg of body mass", GRAVITY_M_S2), ("% of the body weight", 100.0)]
-    if mass_kg is not None:
+    if mass_kg is None:
+        kilograms = 1000.0 * load / GRAVITY_M_S2
+        units += [("kN", load)] if PERSON_MASS_KG[0] < kilograms < PERSON_MASS_KG[1] else []
+    else:
         newtons = [("kg of force", GRAVITY_M_S2), ("pounds of force", 4.448222), ("kN", 1000.0)]
         units += [(name, mass_kg * GRAVITY_M_S2 / one) for name, one in newtons]
     fits = [name for name, of_one in units if abs(load / of_one - 1.0) < UNIT_WITHIN]
@@ -106,7 +109,7 @@ def check_weight(
     if vertical <= 0:
         findings.refuse(
             f"the vertical force is {vertical:.1f} N ({when}), expected a positive one near m g "
-            f"(ground on person, vertical axis {ground.vertical})"
+            f"(ground on person, vertical axis {ground.vertical}){_of_the_person(-vertical)}"
         )
         return None
     mass = vertical / GRAVITY_M_S2
@@ -122,6 +125,16 @@ def check_weight(
             "of the forces?)"
         )
     return mass
+
+
+def _of_the_person(pull: float) -> str:
+    """What to do about plates that pull by so much, N, on average: a person's weight is the action on them."""
+    if not PERSON_MASS_KG[0] < pull / GRAVITY_M_S2 < PERSON_MASS_KG[1]:
+        return ""
+    return (
+        ". They look like the forces of the person on the plates (action): turn the signs of all forces and moments in "
+        "the file"
+    )
 
 
 def check_steps(

@@ -14,6 +14,7 @@ from dynakin.errors import ConfigError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.declared import may_bear
 from dynakin.filter.expected import ContactPaths, expected_loads
+from dynakin.filter.shear import NO_SHEAR, VERTICAL_ONLY, Shear
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.belt import WINDOW_S, velocities
 from dynakin.recordings.feet.contact import (
@@ -32,6 +33,8 @@ from dynakin.recordings.feet.soles import FootShape, Soles
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate, level_pressure
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
+from dynakin.recordings.plates.stuck import STILL_N
+from dynakin.results.naming import sentence
 from dynakin.settings.noise import Noise
 from dynakin.stream.closure import DELAY_S, LiveClosure
 
@@ -101,6 +104,7 @@ class LiveFeet:
         self._closure: LiveClosure | None = None
         self.claimed = False
         """Whether in the last frame the plates carried all of the person by what feet and plates show."""
+        self._sideways, self._vertical = False, False  # a plate has shown a horizontal force; loaded plates show none
         self._said: set[str] = set()
         self._to_say: list[str] = []
 
@@ -131,12 +135,27 @@ class LiveFeet:
         self._highest = max(self._highest, float(paths[0, 0, 1]))
         bears = may_bear(self.initial, paths, self._lowest, self._highest - self._lowest)
         bears &= ~np.array([name in loads.others for name in self.initial.contacts], dtype=bool)
-        self.claimed = bool(loads.total_known[0] and not bears.any())
+        shear = self._shear(wrenches)
+        self.claimed = self._whole(loads, bears)
         if markers is not None and wrenches is not None:
             loads = self._closed(loads, time_s, markers, places, wrenches, bears)
         undeclared = loads.elsewhere & (wrenches is not None)
-        whole = bool(loads.total_known[0] and not bears.any())
-        return expected_loads(loads, self.initial, self.noise, paths, undeclared, bears), whole
+        whole = self._whole(loads, bears)
+        return expected_loads(loads, self.initial, self.noise, paths, undeclared, bears, shear), whole
+
+    def _whole(self, loads: FootLoads, bears: Flags) -> bool:
+        return bool(loads.total_known[0] and not bears.any() and not self._vertical)
+
+    def _shear(self, wrenches: Array | None) -> Shear:
+        """Whether the plates measure horizontal forces: noise alone shows that they do."""
+        if not self._sideways and wrenches is not None:
+            force = np.abs(self.initial.ground.wrench_to_ground(wrenches)[:, :3])
+            self._sideways = bool((force[:, [0, 2]] > STILL_N * force[:, [1]]).any())
+            self._vertical = not self._sideways and bool((force[:, 1] > JUDGED_N).any())
+        if not self._vertical:
+            return NO_SHEAR
+        self._say(sentence(VERTICAL_ONLY.text))
+        return Shear(unmeasured=True)
 
     def _closed(
         self, loads: FootLoads, time_s: float, markers: Array, places: Array, wrenches: Array, bears: Flags
@@ -144,7 +163,7 @@ class LiveFeet:
         """The same where the plates do not carry what the motion of the centre of mass needs, `DELAY_S` ago."""
         if self._closure is None:
             self._closure = LiveClosure(self.initial)
-        whole = bool(loads.total_known[0] and not bears.any())
+        whole = self._whole(loads, bears)
         seen = np.isfinite(markers)
         judged = whole and bool(seen.mean() >= _SEEN)  # what the filter expects shows no force
         force = self.initial.ground.wrench_to_ground(wrenches)[:, :3].sum(axis=0) if judged else None

@@ -18,7 +18,9 @@ from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Recording
+from dynakin.recordings.weight import CONVERT, likely_unit, while_loaded
 from dynakin.settings.subject import Subject
 from dynakin.units import GRAVITY_M_S2
 
@@ -68,7 +70,7 @@ def find_mass(
     """
     if subject.mass_kg is not None:
         return subject.mass_kg, [note("mass", f"Mass {subject.mass_kg:.2f} kg: given.")]
-    reasons, means = [], []
+    reasons, means, refused = [], [], False
     for recording, ground in trials:
         if not recording.plates:
             reasons.append(f"{recording.name} has no force plates")
@@ -76,7 +78,11 @@ def find_mass(
         loads = foot_loads(recording, ground, foot_markers)
         check = check_plates(recording, ground, None, foot_markers, loads)
         if check.refusal is not None:
+            refused = True
             reasons.append(f"{recording.plates_file}: {check.refusal}")
+        elif unit := _other_unit(recording, ground):
+            refused = True
+            reasons.append(f"{recording.plates_file}: {CONVERT.format(unit).replace('The', 'the', 1)}")
         elif check.mass_kg_from_plates is None:
             mean, why = steady_load(recording, loads)
             reasons.append(f"nobody stands still on the plates of {recording.name}, and {why}")
@@ -107,10 +113,20 @@ def find_mass(
             "plates. Forces and moments grow with it. Give the mass if it is known."
         )
         return mass, [note("mass", f"Mass {mass:.1f} kg: assumed."), warning("mass", doubt)]
+    action = "expected mass_kg of the subject (--mass)"
+    if refused:
+        action = "correct the forces first; --mass alone does not help"
     raise ModelError(
-        f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject (--mass)",
+        f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); {action}",
         asks_for="mass_kg",
     )
+
+
+def _other_unit(recording: Recording, ground: GroundFrame) -> str:
+    """In which unit plates may be that carry next to nothing as N; "" where in none."""
+    total = np.sum([plate.force for plate in recording.plates], axis=0)
+    push = ground.vectors_to_ground(total)[:, 1]
+    return likely_unit(while_loaded(push)) if 0.0 < np.nan_to_num(push).max(initial=0.0) < JUDGED_N else ""
 
 
 def impulse_load(
@@ -179,9 +195,11 @@ def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) ->
                 f"{mass_kg:.1f} kg ({index:.0f} kg/m2, expected {low:g} to {high:g}); expected height_m of the subject "
                 "(--height)"
             )
+        unit = likely_unit(mass_kg * GRAVITY_M_S2)
+        action = f". {CONVERT.format(unit)}" if unit else "; expected mass_kg of the subject (--mass)"
         raise ModelError(
             f"mass_kg is not given, and {mass_kg:.1f} kg by plates or file is no mass of a person of {height_m:.2f} m "
-            f"({index:.0f} kg/m2, expected {low:g} to {high:g}); expected mass_kg of the subject (--mass)",
+            f"({index:.0f} kg/m2, expected {low:g} to {high:g}){action}",
             asks_for="mass_kg",
         )
 

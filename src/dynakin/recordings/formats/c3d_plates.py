@@ -101,7 +101,8 @@ def read_plates(
         raws.append(raw)
         numbers.append(k)
         notes += said
-    notes += shared_channels(parameters, numbers)
+    raws, said = _without_shared(raws, shared_channels(parameters, numbers))
+    notes += said
     turned = pulling([raw.force @ raw.surface.normal for raw in raws])
     notes += turned_in_words([raw.name for raw in raws], turned)
     raws = [
@@ -212,27 +213,48 @@ def _channels(parameters: Parameters, k: int, wanted: int, count: int) -> list[i
     return [int(number) - 1 for number in numbers]
 
 
-def shared_channels(parameters: Parameters, plates: Sequence[int]) -> list[Message]:
-    """Warnings of those plates (from 0) that list a channel of one before them: it is not both plates'."""
+def shared_channels(parameters: Parameters, plates: Sequence[int]) -> dict[str, tuple[list[str], Message]]:
+    """Plate -> those of these plates (from 0) before it whose channels it lists too, and a warning: such a channel is
+    not both plates'."""
     listed = parameters.array("FORCE_PLATFORM", "CHANNEL")
     types = parameters.array("FORCE_PLATFORM", "TYPE").ravel()
-    found, owners = list[Message](), dict[float, str]()
+    found, owners = dict[str, tuple[list[str], Message]](), dict[float, str]()
     for k in plates:
         name = f"plate {k + 1}"
         own = listed.reshape(listed.shape[0], -1)[: TYPES[int(types[k])].channels, k].tolist()
         if shared := [channel for channel in own if channel in owners]:
             numbers = ", ".join(f"{channel:g}" for channel in shared)
-            others = " and ".join(dict.fromkeys(owners[channel] for channel in shared))
-            found.append(
-                warning(
-                    "plates",
-                    f"{name} lists the analog channels of {others} (numbers {numbers} in FORCE_PLATFORM:CHANNEL): at "
-                    "most one of these plates is measured. Correct the list in the file.",
-                )
+            others = list(dict.fromkeys(owners[channel] for channel in shared))
+            text = (
+                f"{name} lists the analog channels of {' and '.join(others)} (numbers {numbers} in "
+                "FORCE_PLATFORM:CHANNEL): at most one of these plates is measured, and none is used. Correct the list "
+                "in the file."
             )
+            found[name] = others, warning("plates", text)
         for channel in own:
             owners.setdefault(channel, name)
     return found
+
+
+def _without_shared(raws: list[_Raw], shared: dict[str, tuple[list[str], Message]]) -> tuple[list[_Raw], list[Message]]:
+    """The plates, not measured (NaN) where they share channels and are loaded, and warnings. One that is another from
+    the first channel to the last is left to `without_doubles`, which knows where they lie."""
+    by_name, lost, notes = {raw.name: raw for raw in raws}, set[str](), list[Message]()
+    for name, (others, said) in shared.items():
+        own = np.linalg.norm(by_name[name].force, axis=1)
+        if not np.nanmax(own, initial=0.0) > JUDGED_N:
+            continue
+        if not any(_same(own, np.linalg.norm(by_name[other].force, axis=1)) for other in others):
+            lost |= {name, *others}
+            notes.append(said)
+    nothing = {name: np.full_like(by_name[name].force, np.nan) for name in lost}
+    return [
+        replace(raw, force=nothing[raw.name], moment=nothing[raw.name]) if raw.name in lost else raw for raw in raws
+    ], notes
+
+
+def _same(sizes: Array, others: Array) -> bool:
+    return bool(np.allclose(sizes, others, rtol=1e-9, atol=0.0, equal_nan=True))
 
 
 def _slice(values: Array, k: int, size: int, key: str) -> Array:

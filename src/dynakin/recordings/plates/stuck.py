@@ -137,6 +137,27 @@ def without_dead_channels(recording: Recording) -> Recording:
     return recording.with_plates(tuple(plates), tuple(notes)) if notes else recording
 
 
+def vertical_only(recording: Recording) -> bool:
+    """Whether no plate of a recording measures horizontal forces: they stay what they are, or the same part of the
+    vertical force (of a plate that lies tilted), while that changes. A load that never changes is made up, and lacks
+    nothing."""
+    total = np.nansum([np.abs(np.nan_to_num(plate.force)).sum(axis=0) for plate in recording.plates], axis=0)
+    up, changes = int(np.argmax(total)) if recording.plates else 0, False
+    for plate in recording.plates:
+        loaded = plate.force[np.abs(np.nan_to_num(plate.force[:, up])) > JUDGED_N]
+        if not len(loaded) >= max(PRESS_S * recording.rate, 3.0):  # a rate that is NaN, too
+            continue
+        least = STILL_N * np.abs(loaded[:, up]).max()
+        moves = loaded - loaded.mean(axis=0)
+        if np.ptp(moves[:, up]) < least:
+            continue
+        follows = moves[:, [up]] * (moves[:, up] @ moves / (moves[:, up] @ moves[:, up]))
+        if np.abs(moves - follows).max() > least:
+            return False
+        changes = True
+    return changes
+
+
 def _presses(plate: Plate, p: int, up: int, level: Sequence[int], recording: Recording) -> list[_Press]:
     """The presses of a plate that can be judged."""
     push, found = np.abs(np.nan_to_num(plate.force[:, up])), []

@@ -91,6 +91,11 @@ _KINDS = (
         "something else bears the person there, declare it (--contact).",
     ),
     _Kind(
+        "Plates' horizontal forces",
+        ("vertical only",),
+        "Export the horizontal forces as well, or record with plates that measure them.",
+    ),
+    _Kind(
         "Plates' place",
         ("place",),
         "Correct where the file has the plates (corners, origin, centres of pressure), or declare what else steadies "
