@@ -1,6 +1,8 @@
-"""Times of frames: their step, their rate, and the even grid about which they lie."""
+"""Times of frames: their step, their rate, the even grid about which they lie, and stretches of them in words."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -66,3 +68,14 @@ def scatters(off: Array, step: float) -> bool:
     over a few frames much less, as they do not where a frame is missing."""
     mean = np.convolve(off, np.full(_FEW, 1.0 / _FEW), mode="valid") if len(off) >= _FEW else off
     return bool(np.abs(off).max() < 0.5 * step and np.abs(mean).max() < 0.3 * step)
+
+
+def span(time: Array, first: int, end: int) -> str:
+    """When frames [first, end) are: ``0.10 to 0.55 s``."""
+    return f"{time[first]:.2f} to {time[end - 1]:.2f} s"
+
+
+def spans(time: Array, stretches: Sequence[tuple[int, int]], most: int | None = None) -> str:
+    """When the frames of these `runs` are: ``0.10 to 0.55 s, 1.20 to 1.31 s and 2 more``."""
+    more = f" and {len(stretches) - most} more" if most is not None and len(stretches) > most else ""
+    return ", ".join(span(time, *stretch) for stretch in stretches[:most]) + more

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynakin.arrays import runs
-from dynakin.recordings.times import step_of
+from dynakin.recordings.times import span, step_of
 from dynakin.report.findings.finding import Insight, Level, Metrics
 from dynakin.report.labels import short_marker_names
 from dynakin.results.estimate import Estimate
@@ -46,7 +46,7 @@ def _unseen(estimate: Estimate) -> dict[str, str]:
     segments, time = estimate.marker_segments, estimate.time
     owners = [segments.get(site, "") for _, site in marker_sites(estimate)]
     hidden = out_of_sight(np.isfinite(estimate.values("markers_measured")).any(axis=2), owners, time)
-    spans = {name: [f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(own)] for name, own in hidden.items()}
+    spans = {name: [span(time, a, b) for a, b in runs(own)] for name, own in hidden.items()}
     return {name: listed(own, 3) for name, own in spans.items() if own}
 
 
