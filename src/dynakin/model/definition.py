@@ -173,7 +173,7 @@ class ModelDefinition:
             try:
                 match = recognise(recording).match  # places are guessed
             except ModelError:
-                raise ModelError(f"{error.message}; what came: {', '.join(came)}", asks_for=error.asks_for) from None
+                raise error.reworded(f"{error.message}; what came: {', '.join(came)}") from None
         usual = {marker.name: marker for marker in match.marker_set.usual}
         sides = ("right", "left", "centre")
         expected = [marker.aliases(side)[0] for marker in usual.values() for side in sides if marker.aliases(side)]

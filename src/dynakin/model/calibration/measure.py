@@ -142,7 +142,7 @@ def told_of_the_static(recording: Recording, static: Recording | None) -> Iterat
         if static is None or not other:
             raise
         text = f"{refusal.message}. Of the standing trial {static.path or static.name}: {other}"
-        raise type(refusal)(text, asks_for=refusal.asks_for) from None
+        raise refusal.reworded(text) from None
 
 
 def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
@@ -177,7 +177,7 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
         ground = trials.trial.ground
         other, _ = against_vertical(asked.recording, ground.vertical, trials.trial.match.facing_pairs)
         why = f"; vertical is {ground.vertical}, but the markers show {other}" if other else ""
-        raise ModelError(f"{error.message}{why}", asks_for=error.asks_for) from None
+        raise error.reworded(f"{error.message}{why}") from None
     if subject.sex is None:
         messages.append(
             note(
@@ -317,7 +317,7 @@ def _landmarks(
         found = completed(model, asked.table, marked.locks, legs.landmarks, standing, height_m, still.trial.match.where)
     except ModelError as error:
         reasons = dict.fromkeys(source.match.left_out.values())
-        raise ModelError("; ".join([error.message, *reasons]), asks_for=error.asks_for) from None
+        raise error.reworded("; ".join([error.message, *reasons])) from None
     if still.stands:
         messages += check_standing(found.landmarks, source.recording.name, given=asked.static is not None)
     supposed = supposed_legs(found, legs, marked.chosen)

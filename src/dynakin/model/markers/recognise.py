@@ -304,7 +304,7 @@ def _guessed(recording: Recording, unknown: ModelError) -> Recognised:
         guessed = drafted(recording)
     except RecordingError as error:
         why = error.message.removeprefix(f"{where}: ")
-        raise ModelError(f"{unknown.message}; nor can places be guessed: {why}") from None
+        raise unknown.reworded(f"{unknown.message}; nor can places be guessed: {why}") from None
     if guessed is None:
         raise unknown
     found = checked(recording, match_markers(guessed, recording.marker_names, recording.seen, where))
