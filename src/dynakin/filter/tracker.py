@@ -15,7 +15,7 @@ from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.noise import prior_factor
-from dynakin.filter.reported_sd import BLOCKS
+from dynakin.filter.reported_sd import BLOCKS, as_believed
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sources import ContactSources, LiveSight
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
@@ -239,8 +239,8 @@ class Tracker:
                 rate = self._wrench_rate(step, state, wrench)
             segments = () if step is None else step.segments
             sources, used = (None, None) if step is None else (step.sources, step.used)
-            if step is not None and not step.unmeasured:  # refused plates: no surer than believed ones
-                sources = np.where(step.sources == DERIVED, MEASURED, step.sources)
+            if step is not None and not step.unmeasured:  # what is derived has refused plates
+                sources = as_believed(step.sources)
             found |= self.systematic.added(
                 found, state, covariance, wrench, segments,
                 sources=sources, off_plates=self._off_plates, late=late, used=used,

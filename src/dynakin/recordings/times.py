@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.errors import RecordingError
+
 Array = npt.NDArray[np.float64]
 
 _PAUSE_S = 1.0  # nothing is led across it
@@ -49,6 +51,25 @@ def on_grid(numbers: npt.NDArray[np.intp], values: Array) -> Array:
     found = np.full((int(numbers[-1]) + 1, *values.shape[1:]), np.nan)
     found[numbers] = values
     return found
+
+
+def even_step(time: Array) -> float:
+    """Time step (s) of evenly spaced frames; times rounded by a file are even enough.
+
+    Raises:
+        RecordingError: a frame lies more than half a step off, as after dropped frames, or there are fewer than two.
+    """
+    if len(time) < 2:
+        raise RecordingError(f"low-pass and derivatives: {len(time)} frames, expected at least two")
+    step = float((time[-1] - time[0]) / (len(time) - 1))
+    off = np.abs(time - time[0] - step * np.arange(len(time)))
+    if not step > 0.0 or off.max() > 0.5 * step:
+        k = int(np.argmax(off))
+        raise RecordingError(
+            f"frame {k + 1} ({time[k]:.4f} s) lies {1000 * off[k]:.1f} ms off an even spacing of {1000 * step:.2f} ms; "
+            "low-pass and derivatives expect evenly spaced frames"
+        )
+    return step
 
 
 def even_grid(time: Array) -> tuple[float, Array]:

@@ -229,7 +229,7 @@ def trial_of(
     turned = {preset: facing(estimate) for preset, estimate in estimates.items()}
     methods = [_method(f"EKF ({preset})", "EKF", estimate.data) for preset, estimate in turned.items()]
     given, first = next(iter(estimates.values())), next(iter(turned.values()))
-    notes, in_space = how_estimated(estimates), bool(first.modelled_axes().all())
+    notes, in_space = how_estimated(estimates), not first.planar
     try:
         if not in_space:
             methods += _in_plane(first, initial, definition, cutoff_hz, notes)
