@@ -316,24 +316,6 @@ class Tracker:
         check_can_smooth(self.noise)
         return smoothed(self._run(self._filter.run_smoothed, (time, markers, wrench), (progress,), feet))
 
-    def run_lagged_arrays(
-        self,
-        time: Array,
-        markers: Array,
-        wrench: Array,
-        lag: int,
-        progress: Progress | None = None,
-        feet: ContactLoads | None = None,
-    ) -> dict[str, Array]:
-        """`run_smoothed_arrays`, where each frame is smoothed from those until ``lag`` frames later alone: what
-        `delayed` gives of it, with its deviations. The last frames are estimated from those that there are.
-
-        Raises:
-            ConfigError, DivergenceError: as `run_smoothed_arrays`.
-        """
-        check_can_smooth(self.noise)
-        return smoothed(self._run(self._filter.run_lagged, (time, markers, wrench), (lag, progress), feet))
-
     def run_late_arrays(
         self,
         lag: int | None,
@@ -343,7 +325,8 @@ class Tracker:
         progress: Progress | None = None,
         feet: ContactLoads | None = None,
     ) -> dict[str, Array]:
-        """Each frame estimated with this lag (frames; None: smoothed; 0: as `run_arrays`).
+        """Each frame estimated from those until ``lag`` frames later: what `delayed` gives of it, with its deviations,
+        and the last frames from those that there are. None: `run_smoothed_arrays`; 0: `run_arrays`.
 
         Raises:
             ConfigError, DivergenceError: as `run_smoothed_arrays`.
@@ -352,7 +335,8 @@ class Tracker:
             return self.run_smoothed_arrays(time, markers, wrench, progress, feet)
         if not lag:
             return self.run_arrays(time, markers, wrench, progress, feet)
-        return self.run_lagged_arrays(time, markers, wrench, lag, progress, feet)
+        check_can_smooth(self.noise)
+        return smoothed(self._run(self._filter.run_lagged, (time, markers, wrench), (lag, progress), feet))
 
     def _run(
         self,

@@ -152,7 +152,8 @@ def with_subject(identifying: IdentifyingTrial) -> tuple[IdentifyingTrial, list[
 
     What the filter itself ends with is not asked: by parts of the identifying trial its inertia looked 4 % better than
     the table where it was 9 % worse on the rest, and the other way round (docs/identification.md). The batch estimate,
-    held by its prior and weighed by what its residuals last, keeps its word. Where no subject can be identified there is none, and the sentences say why.
+    held by its prior and weighed by what its residuals last, keeps its word. Where no subject can be identified there
+    is none, and the sentences say why.
     """
     try:
         found = identify_subject(_estimator(identifying), [identifying.recording], static=identifying.static)

@@ -98,13 +98,7 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
         model = _core.Model(to_core(plan))
         messages += how
     first = int(usable[0])
-    if first > 0:
-        messages.append(
-            note(
-                "details",
-                f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.",
-            )
-        )
+    messages += trial.late_start(first)
     fit = start_posture(model, paths[first], limits=limits, where=trial.match.where)
     messages.append(
         note(
