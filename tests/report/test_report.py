@@ -18,8 +18,8 @@ from dynakin.report.findings.finding import Insight
 from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import moment_note, short_marker_names
 from dynakin.report.page import SECTIONS, render_report
-from dynakin.report.plot import thin
 from dynakin.report.sections.section import Page, Section
+from dynakin.report.styles import thin
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.consistency import Consistency, Judgement

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.identification.batch import Posterior
 from dynakin.identification.decision import Decision
-from dynakin.identification.observability.base import base_spread
+from dynakin.identification.observability.structure import base_spread
 from dynakin.model.identified import Batch, IdentifiedSubject
 from dynakin.results.measures.posterior import judged
 from dynakin.results.naming import listed, number, words

@@ -13,9 +13,9 @@ from dynakin.errors import DynakinError, LostError
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.batch import Posterior
 from dynakin.identification.decision import Decision, decide, estimate
-from dynakin.identification.observability.base import base_of
 from dynakin.identification.observability.element_words import base_words
 from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.observability.structure import base_of
 from dynakin.identification.report import in_words
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.messages import Message, warning, warnings_of

@@ -19,7 +19,7 @@ from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table, read_table
 from dynakin.recordings.formats.textfile import first_cell, refuse_export
 from dynakin.recordings.formats.trc import read_trc
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.plates.pressure import JUDGED_N, main_axis
 from dynakin.recordings.plates.stuck import without_dead_channels
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
@@ -151,8 +151,7 @@ def cuts_into_loads(raw: Recording, filtered: Recording, cutoff_hz: float) -> Me
     """A warning where plates that were low-passed differ from what they were by more than noise."""
     worst, name = 0.0, ""
     for before, after in zip(raw.plates, filtered.plates, strict=True):
-        up = int(np.argmax(np.nansum(np.abs(before.force), axis=0)))
-        push = np.abs(before.force[:, up])
+        push = np.abs(before.force[:, main_axis([before])])
         loaded = (push > JUDGED_N) & np.isfinite(after.force).all(axis=1)
         if np.count_nonzero(loaded) < _LEAST:
             continue

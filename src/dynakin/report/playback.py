@@ -16,9 +16,8 @@ from markupsafe import Markup
 
 from dynakin.report.body import chain_of, painted
 from dynakin.report.labels import short_marker_names
-from dynakin.report.plot import INK, MEASURED
 from dynakin.report.sides import Joint, joints_of, normalising_mass
-from dynakin.report.styles import SIDE_COLOURS
+from dynakin.report.styles import INK, MEASURED, SIDE_COLOURS
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import reported
 from dynakin.results.measures.feet import foot_sources

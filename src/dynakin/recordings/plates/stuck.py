@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.messages import Message, warning
-from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, main_axis
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.times import spans
 
@@ -102,8 +102,7 @@ def without_dead_channels(recording: Recording) -> Recording:
     plate."""
     if not recording.plates or recording.n_frames < 2:
         return recording
-    total = np.nansum([np.abs(np.nan_to_num(plate.force)).sum(axis=0) for plate in recording.plates], axis=0)
-    up = int(np.argmax(total))
+    up = main_axis(recording.plates)
     level = [axis for axis in range(3) if axis != up]
     presses = [press for p, plate in enumerate(recording.plates) for press in _presses(plate, p, up, level, recording)]
     if not presses:

@@ -17,7 +17,6 @@ from dynakin.report.body import chain_of, painted
 from dynakin.report.chart import band_is_too_wide
 from dynakin.report.figure import draw_sourced
 from dynakin.report.labels import COMPONENT_LABELS, moment_note
-from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
 from dynakin.report.sections.repetitions import (
     KINDS,
     ONE_SD,
@@ -30,7 +29,7 @@ from dynakin.report.sections.repetitions import (
     plots_by_method,
 )
 from dynakin.report.sides import joints_of, side_lines
-from dynakin.report.styles import BAND, LineStyle, method_styles, source_key
+from dynakin.report.styles import BAND, ESTIMATED, INK, MEASURED, QUIET, LineStyle, method_styles, source_key
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.mean_curves import PERCENT, estimate_curves
