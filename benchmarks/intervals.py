@@ -29,9 +29,10 @@ from scipy.optimize import minimize
 from source_digest import source_digest
 
 import dynakin
+from dynakin.filter.contacts import any_off_plates
 from dynakin.filter.error_sizes import LANDMARKS, SCALED, Sizes, usual_sizes
 from dynakin.filter.reported_sd import BLOCKS, Parts, reported
-from dynakin.filter.systematic import Systematic, any_off_plates
+from dynakin.filter.systematic import Systematic
 from dynakin.model.definition import load_model
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import MEASURED, moment_sources

@@ -25,7 +25,6 @@ from dynakin.filter.reported_sd import BLOCKS, Parts, as_believed, movement_inte
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
-from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.times import step_of
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import in_use, moment_sources, plates_refused
@@ -34,6 +33,7 @@ from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
     import xarray as xr
+from dynakin.filter.contacts import any_off_plates, wrenches_of
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -239,7 +239,7 @@ class Systematic:
         # how inertia hangs together is known at the end alone, how well it is known in each frame
         sd = values_of(data, "state_sd")[:, self._inertia]
         together = _correlation(data["final_covariance"].values[np.ix_(self._inertia, self._inertia)])
-        wrench, segments = _contacts(data)
+        wrench, segments = wrenches_of(data)
         chosen = _sampled(time)
         used = in_use(np.isfinite(values_of(data, "markers_measured")).any(axis=2), time)
         each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments, used[k]) for k in chosen]
@@ -256,7 +256,7 @@ class Systematic:
     def moments_moved(self, data: xr.Dataset, moved: Sequence[Array]) -> Array:
         """(T, C): what moments change by where coordinates, speeds and accelerations (T, C) are others by ``moved`` and
         the contacts' wrenches stay; NaN where the state is not a number."""
-        states, (wrench, segments) = values_of(data, "state"), _contacts(data)
+        states, (wrench, segments) = values_of(data, "state"), wrenches_of(data)
         change = np.hstack([values[:, self._free] for values in moved])
         K = change.shape[1]
         found = np.full((len(states), self._count), np.nan)
@@ -368,27 +368,6 @@ class Systematic:
         states = values_of(data, "state")
         sd = values_of(data, "accelerations_sd")[:, self._free]
         return movement_intensity(states[:, 2 * K : 3 * K], sd)
-
-
-def _contacts(data: xr.Dataset) -> tuple[Array, list[str]]:
-    """Wrenches (T, F, 6) of the contacts and their segments; none where the model has no contacts."""
-    if "foot_wrench" not in data:
-        return np.zeros((len(data["time"]), 0, 6)), []
-    return np.nan_to_num(values_of(data, "foot_wrench")), [str(name) for name in data["foot_segment"].values]
-
-
-def any_off_plates(data: xr.Dataset, feet: int) -> bool:
-    """Whether some foot stands off the plates in a frame of a recording.
-
-    Args:
-        feet: how many of the contacts are feet: the first ones, declared ones follow.
-    """
-    return "foot_contact" in data and stands_off_plates(values_of(data, "foot_contact"), feet)
-
-
-def stands_off_plates(contact: npt.NDArray[np.uint8], feet: int) -> bool:
-    """The same of contacts (T, F)."""
-    return bool((contact[:, :feet] == UNMEASURED).any())
 
 
 def _differences(values: list[Array]) -> tuple[Array, Array, Array]:

@@ -12,14 +12,14 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
-from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.contacts import ContactLoads, stands_off_plates
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.noise import prior_factor
 from dynakin.filter.reported_sd import BLOCKS, as_believed
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sources import ContactSources, LiveSight
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
-from dynakin.filter.systematic import Systematic, stands_off_plates
+from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
