@@ -32,6 +32,7 @@ from dynakin.results.measures.tracking import why_lost
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.lag import in_words
 from dynakin.units import COMPONENTS
+from dynakin.validation.case import Setup
 from dynakin.validation.reference.inverse_dynamics import (
     INVERSE,
     inverse_name,
@@ -40,7 +41,6 @@ from dynakin.validation.reference.inverse_dynamics import (
     with_plates,
 )
 from dynakin.validation.reference.methods import Lengths, Reference, reference_methods
-from dynakin.validation.setup import Setup
 
 if TYPE_CHECKING:
     import xarray as xr
