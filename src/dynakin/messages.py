@@ -83,18 +83,19 @@ def warning(topic: Topic, text: str) -> Message:
 
 @dataclass
 class Findings:
-    """What a check says of what it looks at, and why that cannot be used."""
+    """What a check says of what it looks at, on a topic where it names no other, and why that cannot be used."""
 
+    topic: Topic
     messages: list[Message] = field(default_factory=list)
     refusals: list[str] = field(default_factory=list)
 
-    def say(self, text: str, topic: Topic = "plates") -> None:
+    def say(self, text: str, topic: Topic | None = None) -> None:
         """A note."""
-        self.messages.append(note(topic, text))
+        self.messages.append(note(topic or self.topic, text))
 
-    def warn(self, text: str, topic: Topic = "plates") -> None:
+    def warn(self, text: str, topic: Topic | None = None) -> None:
         """A warning."""
-        self.messages.append(warning(topic, text))
+        self.messages.append(warning(topic or self.topic, text))
 
     def refuse(self, text: str) -> None:
         """A reason for which it cannot be used."""

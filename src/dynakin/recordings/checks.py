@@ -89,7 +89,7 @@ def check_plates(
     """
     if not recording.plates:
         return PlateCheck(None, None, (), "no force plates in this recording, expected at least one")
-    findings = Findings()
+    findings = Findings("plates")
     standing = _on_plates(standing_window(recording), recording, ground)
     if not np.all([np.isfinite(plate.force).all(axis=1) for plate in recording.plates], axis=0).any():
         findings.warn(

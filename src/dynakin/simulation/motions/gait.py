@@ -1,5 +1,5 @@
-"""Walking over three force plates in a row, one foot on each, beginning and ending in mid-stride; and on a moving belt, a
-level walk seen from somebody who moves along with the person.
+"""Walking over three force plates in a row, one foot on each, beginning and ending in mid-stride; and on a moving belt,
+a level walk seen from somebody who moves along with the person.
 
 Between two observers of constant speed neither forces nor moments differ (Galilei); the belt does the work that the
 feet's friction takes, which on the ground nobody does.
