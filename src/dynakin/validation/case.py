@@ -16,7 +16,6 @@ from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import Signs
-from dynakin.settings import presets
 from dynakin.settings import presets as known_presets
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.noise import Noise
@@ -35,7 +34,7 @@ class Setup:
     """
 
     common: Estimator
-    noise: Mapping[str, Noise] = field(default_factory=lambda: {"default": presets.default()})
+    noise: Mapping[str, Noise] = field(default_factory=lambda: {"default": known_presets.default()})
     cutoff_hz: float = CUTOFF_HZ
     lag_s: float | None = None
     zero: Zero = "model"

@@ -181,8 +181,6 @@ def open_pool(backend: str = "processes", jobs: int | None = None, scheduler: st
     if jobs is not None and jobs < 1:
         raise ConfigError(f"jobs is {jobs}, expected 1 or more")
     if scheduler is not None:
-        from dynakin.studies.engine.pools import ClusterPool
-
         return ClusterPool(scheduler)
     return LocalPool(backend, jobs or joblib.cpu_count())
 
