@@ -21,7 +21,7 @@ from dynakin.model.definition import load_model
 from dynakin.recordings.read import read
 from dynakin.settings.defaults import HORIZON_S
 from dynakin.settings.subject import Subject
-from dynakin.validation.setup import Setup
+from dynakin.validation.case import Setup
 from dynakin.validation.table2 import MARKERS
 from dynakin.validation.unseen import unseen_figures
 from dynakin.validation.yardsticks import LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead

@@ -29,10 +29,12 @@ from scipy.optimize import minimize
 from source_digest import source_digest
 
 import dynakin
+from dynakin.filter.contacts import any_off_plates
 from dynakin.filter.error_sizes import LANDMARKS, SCALED, Sizes, usual_sizes
 from dynakin.filter.reported_sd import BLOCKS, Parts, reported
-from dynakin.filter.systematic import Systematic, any_off_plates, states_of
+from dynakin.filter.systematic import Systematic
 from dynakin.model.definition import load_model
+from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import MEASURED, moment_sources
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
@@ -181,7 +183,7 @@ def against(
         sources,
         any_off_plates(data, len(tracker.calibrated.feet)),
         tracker.noise.variance_scale,
-        systematic.moved_m(states_of(data))[window],
+        systematic.moved_m(values_of(data, "state"))[window],
         bool(tracked.estimate.config["lag_s"]),
     )
 

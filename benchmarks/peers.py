@@ -31,8 +31,8 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import displacements
 from dynakin.results.records import REFUSED
 from dynakin.settings.subject import Subject
+from dynakin.validation.case import Setup
 from dynakin.validation.held_out import halves, identify_on, measured_wrench, predict_blind
-from dynakin.validation.setup import Setup
 
 Array = NDArray[np.float64]
 DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", Path(__file__).parents[2] / "shared" / "data")) / "opencap_subject4"

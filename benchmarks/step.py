@@ -74,7 +74,7 @@ def smoothing(title: str, model: Definition, recording: dynakin.Recording) -> No
             note(f"step, lag {lag}", [one_step(late, data, k) for k in range(LAGGED)][lag + 1 :])
             few = [values[:LAGGED] for values in data]
             before = process_time()
-            start.fresh().run_lagged_arrays(*few, lag)
+            start.fresh().run_late_arrays(lag, *few)
             note(f"run, lag {lag}, deviations", [1e6 * (process_time() - before) / LAGGED])
         plain = start.fresh()
         note("step, no lag", [one_step(plain, data, k) for k in range(LAGGED)])

@@ -23,7 +23,7 @@ from dynakin.studies.engine.pools import Pool, open_pool
 from dynakin.studies.tuning.fit import Fitter, usual_names
 from dynakin.studies.tuning.score import Shared, figures_of, left_out_mm
 from dynakin.studies.tuning.trial import TuningTrial, prepare, undoubting
-from dynakin.validation.setup import Setup
+from dynakin.validation.case import Setup
 from dynakin.validation.unseen import WITHHELD, plates_withheld
 
 ROOT = Path(__file__).resolve().parents[1]

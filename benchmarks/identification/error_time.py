@@ -16,8 +16,8 @@ from simulated import SKIPPED_ELSE_S, SKIPPED_S, TASKS, judged, subject_of
 
 import dynakin.identification.batch as batch
 from dynakin.identification.batch import identify_batch
-from dynakin.identification.observability.base import base_of
 from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.observability.structure import base_of
 from dynakin.identification.trials import MeasuredTrial, measure_all
 from dynakin.identification.unknowns import Unknowns
 from dynakin.simulation.bodies.subject import Spread

@@ -21,8 +21,8 @@ from simulated import DURATION_S, MARKERS, SKIPPED_S, SUBJECT, judged
 
 import dynakin
 from dynakin.identification.batch import identify_batch, wrench_rows
-from dynakin.identification.observability.base import base_of
 from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.observability.structure import base_of
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.identification.unknowns import Unknowns
 from dynakin.results.measures.posterior import judged as judgement

@@ -17,8 +17,8 @@ from candidates import all_candidates, batch, predicted
 
 import dynakin
 from dynakin.identification.decision import rms_of
-from dynakin.identification.observability.base import base_of
 from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.observability.structure import base_of
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.identification.unknowns import Unknowns
 from dynakin.simulation.output import SimulatedTrial

@@ -8,6 +8,7 @@ dynakin.
 from __future__ import annotations
 
 import re
+from typing import Self
 
 _LONGEST = 1000  # characters that somebody reads; a damaged file can bring a name of a hundred thousand
 _UNPRINTABLE = re.compile("[\x00-\x1f\x7f\x85\u2028\u2029\ud800-\udfff]")
@@ -32,6 +33,10 @@ class DynakinError(Exception):
             message = f"{message[: _LONGEST // 2]} ... {message[-_LONGEST // 2 :]}"
         super().__init__(message)
         self.message, self.asks_for = message, asks_for
+
+    def reworded(self, message: str) -> Self:
+        """The same error in other words, usually its own and more."""
+        return type(self)(message, asks_for=self.asks_for)
 
 
 class RecordingError(DynakinError):

@@ -7,7 +7,7 @@ time.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 Level = Literal["note", "warning", "failure"]
@@ -80,6 +80,27 @@ def note(topic: Topic, text: str) -> Message:
 def warning(topic: Topic, text: str) -> Message:
     """A message after which a trial may not be what it is taken for."""
     return Message(topic, "warning", text)
+
+
+@dataclass
+class Findings:
+    """What a check says of what it looks at, on a topic where it names no other, and why that cannot be used."""
+
+    topic: Topic
+    messages: list[Message] = field(default_factory=list)
+    refusals: list[str] = field(default_factory=list)
+
+    def say(self, text: str, topic: Topic | None = None) -> None:
+        """A note."""
+        self.messages.append(note(topic or self.topic, text))
+
+    def warn(self, text: str, topic: Topic | None = None) -> None:
+        """A warning."""
+        self.messages.append(warning(topic or self.topic, text))
+
+    def refuse(self, text: str) -> None:
+        """A reason for which it cannot be used."""
+        self.refusals.append(text)
 
 
 def about(messages: Iterable[Message], *topics: Topic) -> list[Message]:

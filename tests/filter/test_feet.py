@@ -85,6 +85,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
         unmarked_joints=(),
         unmarked_feet={},
         coupled=None,
+        in_radians=frozenset(),
         guessed_places=False,
         soft_tissue_m=np.zeros(len(SPEC.markers)),
         x0=data.x0,

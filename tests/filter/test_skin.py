@@ -7,8 +7,8 @@ import pytest
 
 from dynakin.bindings import _core
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.joint_errors import followed
 from dynakin.filter.skin import following_skin
-from dynakin.filter.systematic import followed
 from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import load_model
 from dynakin.results.records import FOLLOWING

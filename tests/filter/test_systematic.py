@@ -14,10 +14,11 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
+from dynakin.filter.contacts import any_off_plates
 from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes, usual_sizes
-from dynakin.filter.joint_errors import JointErrors
+from dynakin.filter.joint_errors import SKIN_ANGLE_RAD, JointErrors
 from dynakin.filter.reported_sd import BLOCKS, OWN_AT_ONCE, OWN_LATE, STILL, movement_intensity, reported
-from dynakin.filter.systematic import _STEP_S, COMMON, ROOT_SKIN, SKIN_ANGLE_RAD, Systematic, any_off_plates
+from dynakin.filter.systematic import _STEP_S, COMMON, ROOT_SKIN, Systematic
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
 from dynakin.settings.noise import Noise
 from support.made_in_space import measured

@@ -9,11 +9,11 @@ import pytest
 
 import dynakin
 from dynakin.filter.estimator import Estimator
-from dynakin.identification.held_out import with_subject
+from dynakin.identification.subject import with_subject
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate_squat
+from dynakin.validation.case import Setup
 from dynakin.validation.held_out import Blind, IdentifyingTrial, halves, identify_on, judge, predict_blind
-from dynakin.validation.setup import Setup
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,8 @@ import pytest
 from dynakin.cli.app import main
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.augment import initial_covariance
-from dynakin.identification.change import change_between, change_in_words
 from dynakin.identification.decision import Decision, decide, parts_of
+from dynakin.identification.report import change_between, change_in_words
 from dynakin.identification.subject import Identification, identify_subject, warned
 from dynakin.identification.trials import measure_all
 from dynakin.messages import note, warning, warnings_of

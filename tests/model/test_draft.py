@@ -20,7 +20,8 @@ from dynakin.model.calibration.needs import lacking, needs
 from dynakin.model.definition import available_models, load_built_in_or_toml
 from dynakin.model.markers.anatomy import anatomy, expanded, standing_at
 from dynakin.model.markers.draft.by_name import places, said
-from dynakin.model.markers.draft.draft import Guess, drafted, guess_markers, toml_text
+from dynakin.model.markers.draft.draft import drafted, guess_markers
+from dynakin.model.markers.draft.guess import Guess, toml_text
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
 from dynakin.model.markers.recognise import recognise

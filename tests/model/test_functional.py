@@ -15,7 +15,7 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.functional import functional_landmarks
-from dynakin.model.calibration.joint_motion import JointMotion, angle_deg, joint_axis, joint_centre
+from dynakin.model.calibration.joint_motion import JointMotion, angle_deg, joint_axis, joint_centre, rigid_motion
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.markers.marker_set import load_marker_set
@@ -23,7 +23,6 @@ from dynakin.model.markers.match import match_markers
 from dynakin.recordings.frame import find_laboratory_frame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Array, Recording
-from dynakin.recordings.rigidity import rigid_motion
 from dynakin.settings.subject import Subject
 from dynakin.simulation.sensors.sizes import SensorNoise
 from support.functional_trials import STANDING, functional_trial

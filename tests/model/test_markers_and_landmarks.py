@@ -7,9 +7,9 @@ import pytest
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.landmarks import LandmarkFinder
+from dynakin.model.markers.fit import choose_marker_set
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import MarkerMatch, match_markers
-from dynakin.model.markers.recognise import choose_marker_set
 
 PELVIS = {
     ("ASI", "right"): np.array([0.0, 1.0, 0.12]),

@@ -15,9 +15,10 @@ import pytest
 from dynakin.errors import ModelError, RecordingError
 from dynakin.messages import Message
 from dynakin.model.definition import load_model
+from dynakin.model.markers.fit import choose_marker_set
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import MarkerMatch, match_markers
-from dynakin.model.markers.recognise import Recognised, _without_swap, choose_marker_set, recognise
+from dynakin.model.markers.recognise import Recognised, _without_swap, recognise
 from dynakin.model.markers.swaps import Swap
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import FacingPairs

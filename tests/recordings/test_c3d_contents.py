@@ -11,7 +11,7 @@ import pytest
 from dynakin.errors import RecordingError
 from dynakin.recordings.formats.c3d import read_c3d_results
 from dynakin.recordings.read import read
-from dynakin.recordings.signals import Event
+from dynakin.recordings.recording import Event
 from support.made_c3d import made_c3d
 
 T = 40

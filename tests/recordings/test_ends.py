@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynakin.recordings.recording import Plate, Recording
-from dynakin.recordings.signals import Event
+from dynakin.recordings.recording import Event, Plate, Recording
 from dynakin.recordings.standing import marker_velocities
 
 RATE, FRAMES, MARKERS = 100.0, 60, 8

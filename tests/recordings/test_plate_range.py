@@ -9,7 +9,7 @@ import pytest
 
 from dynakin.messages import warnings_of
 from dynakin.recordings.formats.c3d import read_c3d
-from dynakin.recordings.formats.c3d_range import at_end_of_range
+from dynakin.recordings.formats.c3d_channels import at_end_of_range
 from dynakin.recordings.recording import Recording
 from support.made_recordings import write_c3d
 

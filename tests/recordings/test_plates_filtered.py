@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from dynakin.messages import warnings_of
-from dynakin.recordings.plates.filtered import cuts_into_loads
-from dynakin.recordings.read import read
+from dynakin.recordings.read import cuts_into_loads, read
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.resampling import low_pass
 

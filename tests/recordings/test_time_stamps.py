@@ -11,10 +11,9 @@ from scipy.interpolate import CubicSpline
 
 from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table
-from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
-from dynakin.recordings.times import rate_of
+from dynakin.recordings.times import rate_of, settled_times
 from dynakin.simulation.trial import simulate
 
 

@@ -13,13 +13,13 @@ import pytest
 
 from dynakin.messages import note
 from dynakin.report.figure import new_axes, to_svg
-from dynakin.report.findings import fit, forces, recording, run, uncertainty
+from dynakin.report.findings import fit, forces, recording, uncertainty
 from dynakin.report.findings.finding import Insight
 from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import moment_note, short_marker_names
 from dynakin.report.page import SECTIONS, render_report
-from dynakin.report.plot import thin
 from dynakin.report.sections.section import Page, Section
+from dynakin.report.styles import thin
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.consistency import Consistency, Judgement
@@ -247,7 +247,7 @@ def test_every_warning_names_an_action() -> None:
     """By the source, as no estimate has all of them."""
     calls = [
         node
-        for module in (fit, forces, recording, run, uncertainty)
+        for module in (fit, forces, recording, uncertainty)
         for node in ast.walk(ast.parse(inspect.getsource(module)))
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Insight"
     ]

@@ -13,7 +13,7 @@ from dynakin.model.markers.marker_set import available_marker_sets, load_marker_
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import displacements, published_amplitude_mm, soft_tissue
 from dynakin.simulation.bodies.marker_rows import OPENCAP, PLUG_IN_GAIT
-from dynakin.simulation.sensors.soft_tissue import regions
+from dynakin.simulation.sensors.sensed_markers import regions
 
 KNEE = "S1:RKNE"
 

@@ -388,6 +388,9 @@ def test_a_few_refused_frames_rest_on_the_plates_beside_them() -> None:
     for first, end, stay in ((150, 154, False), (150, 156, True), (0, 2, True), (299, 301, True)):
         verdict = np.zeros((301, 2), dtype=np.uint8)
         verdict[first:end, -1] = REFUSED
-        data = xr.Dataset({"verdict": (("time", "sensor"), verdict)}, coords={"time": 0.01 * np.arange(301)})
+        data = xr.Dataset(
+            {"verdict": (("time", "sensor"), verdict), "foot_contact": (("time", "foot"), verdict)},
+            coords={"time": 0.01 * np.arange(301)},
+        )
         assert refused_for_long(data).any() == stay
         assert not refused_for_long(data)[verdict[:, -1] != REFUSED].any()

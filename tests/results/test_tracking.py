@@ -22,8 +22,8 @@ from dynakin.results.measures.tracking import refuse_lost, tracking_of, why_lost
 from dynakin.settings.subject import Subject
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
+from dynakin.validation.case import Setup
 from dynakin.validation.methods import compare_trial
-from dynakin.validation.setup import Setup
 from support.estimates.synthetic import make_estimate
 
 ARM = slice(7, 10)

@@ -15,7 +15,7 @@ from dynakin.errors import ConfigError
 from dynakin.model.definition import load_model
 from dynakin.simulation.bodies.whole_body import Sole
 from dynakin.simulation.mechanics import kinematics
-from dynakin.simulation.motions.belt import HALF_BELT_M
+from dynakin.simulation.motions.gait import HALF_BELT_M
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate

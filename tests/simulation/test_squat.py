@@ -9,8 +9,8 @@ from dynakin.errors import ConfigError
 from dynakin.recordings.standing import standing_window
 from dynakin.simulation.mechanics import kinematics
 from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.sensors.sensed_markers import regions
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.sensors.soft_tissue import regions
 from dynakin.simulation.trial import simulate_squat
 from support.trees import motion_of
 

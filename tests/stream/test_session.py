@@ -78,7 +78,7 @@ def test_a_live_session_with_a_lag_gives_what_a_recording_with_it_gives(squat: R
     initial, samples = live.tracker.calibrated, [frame.fused.sample for frame in frames]
     markers, wrench = (np.stack(rows) for rows in zip(*(sample_arrays(one, initial) for one in samples), strict=True))
     time_ = np.array([one.time_s for one in samples])
-    arrays = live.tracker.fresh().run_lagged_arrays(time_, markers, wrench, 5)
+    arrays = live.tracker.fresh().run_late_arrays(5, time_, markers, wrench)
     late = [frame.published for frame in frames[5:] if frame.published is not None]
     np.testing.assert_allclose([one.time_s for one in late], time_[:-5], atol=1e-9)
     np.testing.assert_allclose(np.stack([one.moments for one in late]), arrays["moments"][:-5], atol=1e-8)

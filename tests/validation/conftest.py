@@ -8,8 +8,8 @@ import dynakin
 from dynakin.filter.estimator import Estimator
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
+from dynakin.validation.case import Setup
 from dynakin.validation.methods import Trial, compare_trial
-from dynakin.validation.setup import Setup
 
 
 @pytest.fixture(scope="session")

@@ -11,9 +11,9 @@ from dynakin.bindings import _core
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.output import SimulatedTrial
+from dynakin.validation.case import Setup
 from dynakin.validation.freeze import final_values, freeze, initial_values
 from dynakin.validation.held_out import IdentifyingTrial, halves, identify_on, judge, predict_blind
-from dynakin.validation.setup import Setup
 
 
 @pytest.fixture(scope="module")

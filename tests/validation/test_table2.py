@@ -16,10 +16,10 @@ from dynakin.filter.estimator import Estimator
 from dynakin.report.text_tables import table2_text
 from dynakin.results.measures.fit import SignalFit
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.validation.case import Setup
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.files import save_comparison
 from dynakin.validation.methods import Trial, compare_trial
-from dynakin.validation.setup import Setup
 from dynakin.validation.table2 import Spread, marker_fit, spread, table2, table2_of
 
 IN_PLANE = np.array([True, True, False])

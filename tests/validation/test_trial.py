@@ -15,10 +15,10 @@ from dynakin.recordings.frame import find_ground_frame
 from dynakin.results.measures.mean_curves import MEASURED
 from dynakin.results.measures.repetitions import body_paths, find_repetitions
 from dynakin.simulation.output import SimulatedTrial
+from dynakin.validation.case import Setup
 from dynakin.validation.methods import Trial, trial_of
 from dynakin.validation.reference.chain import PlanarChain
 from dynakin.validation.reference.classical import classical_angles, landmark_paths
-from dynakin.validation.setup import Setup
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from dynakin.filter.estimator import Estimator
 from dynakin.report.text_tables import truth_text
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from dynakin.simulation.trial import simulate_squat
+from dynakin.validation.case import Setup
 from dynakin.validation.methods import Method, Trial, compare_trial
-from dynakin.validation.setup import Setup
 from dynakin.validation.truth import FIGURES, LEG, TRUTH, against_truth, truth_errors
 
 

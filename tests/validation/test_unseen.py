@@ -12,7 +12,7 @@ from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate_squat
-from dynakin.validation.setup import Setup
+from dynakin.validation.case import Setup
 from dynakin.validation.unseen import unseen, unseen_figures
 from dynakin.validation.yardsticks import Figures, extrapolated, held, line, persisted
 

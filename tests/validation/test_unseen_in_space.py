@@ -15,7 +15,7 @@ from dynakin.simulation.output import SimulatedTrial, save_trial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
 from dynakin.units import COMPONENTS
-from dynakin.validation.setup import Setup
+from dynakin.validation.case import Setup
 from dynakin.validation.unseen import unseen, unseen_figures
 from dynakin.validation.unseen_in_space import carried_on, left_out_groups
 from dynakin.validation.yardsticks import Figures

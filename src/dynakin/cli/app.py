@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import typer
 
 import dynakin
+from dynakin.cli import STOPPED
 from dynakin.cli.batch import batch
 from dynakin.cli.check import check
 from dynakin.cli.compare import compare
@@ -28,7 +29,6 @@ from dynakin.cli.simulate import simulate
 from dynakin.cli.tune import tune
 from dynakin.errors import DynakinError
 
-_STOPPED = 130  # as shells have it
 # Typer carries its own copy of click or uses click's, depending on its version; its own name leads to either.
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
 
@@ -96,8 +96,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print_error(f"{text}. See {command} --help.")
         return 2
     except (KeyboardInterrupt, typer.Abort):
-        code = _STOPPED
-    if code == _STOPPED:  # which typer may have made of a KeyboardInterrupt itself
+        code = STOPPED
+    if code == STOPPED:  # which typer may have made of a KeyboardInterrupt itself
         print_error("stopped")
     return (code if isinstance(code, int) else 0) or int(lost_output())
 

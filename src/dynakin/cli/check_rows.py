@@ -10,7 +10,7 @@ from dynakin.cli.prepared import Rows, assumed, contacts, in_a_row, short
 from dynakin.errors import DynakinError
 from dynakin.filter.prepared import Prepared
 from dynakin.messages import Message, about, warnings_of
-from dynakin.model.markers.recognise import fits
+from dynakin.model.markers.fit import fits
 from dynakin.pipeline.stages import prepare_case
 from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.recording import Recording

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.padding import Padding
 
 from dynakin.cli.console import as_table
-from dynakin.identification.held_out import with_subject
+from dynakin.identification.subject import with_subject
 from dynakin.messages import Message, note, warnings_of
 from dynakin.progress import stage
 from dynakin.report.text_tables import angle_text, moment_text, table2_text, truth_text, unseen_texts

@@ -128,7 +128,7 @@ def _forces_of(path: Path) -> Path | None:
 
 
 def _compare(paths: list[Path]) -> None:
-    from dynakin.identification.change import change_between, change_in_words
+    from dynakin.identification.report import change_between, change_in_words
     from dynakin.model.identified import read_identified
 
     if len(paths) != 2:

@@ -90,7 +90,8 @@ def new(
     from dynakin.model.calibration.needs import in_words, lacking
     from dynakin.model.definition import available_models, load_built_in_or_toml
     from dynakin.model.markers.anatomy import anatomy
-    from dynakin.model.markers.draft.draft import guess_markers, toml_text
+    from dynakin.model.markers.draft.draft import guess_markers
+    from dynakin.model.markers.draft.guess import toml_text
     from dynakin.model.markers.marker_set import load_marker_set
     from dynakin.recordings.read import read
 

@@ -16,6 +16,7 @@ from dynakin.filter.prepared import Prepared
 from dynakin.messages import Message, about, notes_of
 from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.feet.loads import MEASURED, REASONS, SHARED, SWING, FootLoads
+from dynakin.recordings.times import span
 from dynakin.results.naming import listed, plural
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import Case
@@ -70,7 +71,7 @@ def naming_static(refusal: DynakinError, case: Case) -> DynakinError:
     if refusal.asks_for != "static" or path is None or case.config.static is not None:
         return refusal
     static = companion_static(path, case.recording)
-    return refusal if static is None else type(refusal)(f"{refusal.message} Give --static {static.name}?")
+    return refusal if static is None else refusal.reworded(f"{refusal.message} Give --static {static.name}?")
 
 
 def contacts(ready: Prepared) -> Rows:
@@ -85,7 +86,7 @@ def contacts(ready: Prepared) -> Rows:
             rows.append(("Contacts", f"{foot}: no markers, so when it stands is not known."))
             continue
         spans = _spans(loads, k, names, ready.recording.rate)
-        said = [f"{what} {time[a]:.2f} to {time[b - 1]:.2f} s" for a, b, what in spans]
+        said = [f"{what} {span(time, a, b)}" for a, b, what in spans]
         rest = len(said) - _MOST_SPANS
         text = "; ".join(said[:_MOST_SPANS]) + (f"; and {rest} more" if rest > 0 else "")
         rows.append(("Contacts", f"{foot}: {text or 'never on the ground'}."))
@@ -154,5 +155,5 @@ def _spans(loads: FootLoads, k: int, names: Sequence[str], rate: float) -> list[
 
 
 def _times(time: np.ndarray, frames: np.ndarray) -> str:
-    spans = [f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(frames)]
-    return listed(spans, _MOST_SPANS) if spans else "never"
+    found = [span(time, a, b) for a, b in runs(frames)]
+    return listed(found, _MOST_SPANS) if found else "never"

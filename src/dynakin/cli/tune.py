@@ -71,8 +71,7 @@ def grid(
     from dynakin.studies.engine.journal import ROWS, Journal, open_folder
     from dynakin.studies.engine.pools import open_pool
     from dynakin.studies.tuning.grid import belongs_to, check_size, run_grid
-    from dynakin.studies.tuning.in_words import criteria_text, grid_text
-    from dynakin.studies.tuning.output import write_grid
+    from dynakin.studies.tuning.output import criteria_text, grid_text, write_grid
 
     preset = given.pop("preset", None)
     cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune grid")
@@ -122,8 +121,7 @@ def fit(
     from dynakin.studies.engine.journal import ROWS, Journal, open_folder
     from dynakin.studies.engine.pools import open_pool
     from dynakin.studies.tuning.fit import Fitter, belongs_to_fit, usual_names
-    from dynakin.studies.tuning.in_words import figures_text, recommendation, settings_text
-    from dynakin.studies.tuning.output import write_fit
+    from dynakin.studies.tuning.output import figures_text, recommendation, settings_text, write_fit
 
     preset = given.pop("preset", None)
     cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune fit")

@@ -158,7 +158,7 @@ def _refused_in_words(data: xr.Dataset) -> Message | None:
     if not refused.any():
         return None
     count, of = np.count_nonzero(refused), np.count_nonzero(estimated)
-    long = refused_for_long(data) & estimated if "foot_contact" in data else refused
+    long = refused_for_long(data) & estimated
     how = "are derived from the motion" if long.any() else "rest on the frames before and after"
     text = f"The plates contradict the motion in {count} of {of} frames and are not used there: moments {how}."
     many = count > MANY_REFUSED * of

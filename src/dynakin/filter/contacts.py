@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,10 @@ from dynakin.errors import ModelError
 from dynakin.filter.samples import in_step
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.times import step_of
+from dynakin.results.estimate import values_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
@@ -189,3 +194,24 @@ def _joint(each: Array) -> Array:
     for k in range(count):
         joint[:, k, :, k] = each[:, k]
     return joint.reshape(frames, 6 * count, 6 * count)
+
+
+def wrenches_of(data: xr.Dataset) -> tuple[Array, list[str]]:
+    """Wrenches (T, F, 6) of the contacts and their segments; none where the model has no contacts."""
+    if "foot_wrench" not in data:
+        return np.zeros((len(data["time"]), 0, 6)), []
+    return np.nan_to_num(values_of(data, "foot_wrench")), [str(name) for name in data["foot_segment"].values]
+
+
+def any_off_plates(data: xr.Dataset, feet: int) -> bool:
+    """Whether some foot stands off the plates in a frame of a recording.
+
+    Args:
+        feet: how many of the contacts are feet: the first ones, declared ones follow.
+    """
+    return "foot_contact" in data and stands_off_plates(values_of(data, "foot_contact"), feet)
+
+
+def stands_off_plates(contact: npt.NDArray[np.uint8], feet: int) -> bool:
+    """The same of contacts (T, F)."""
+    return bool((contact[:, :feet] == UNMEASURED).any())

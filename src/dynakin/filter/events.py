@@ -10,6 +10,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_names
+from dynakin.recordings.times import span
 from dynakin.results.records import REFUSED, TRACKING, Event, EventKind, Parameter
 
 if TYPE_CHECKING:
@@ -119,6 +120,6 @@ def _stretches(
     events = []
     for first, end in runs(flags):
         n = end - first
-        text = f"{what} for {n} frame{'s' if n > 1 else ''}, {time[first]:.2f} to {time[end - 1]:.2f} s"
+        text = f"{what} for {n} frame{'s' if n > 1 else ''}, {span(time, first, end)}"
         events.append(Event(float(time[first]), first, kind, subject, text))
     return events

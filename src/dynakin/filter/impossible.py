@@ -11,7 +11,7 @@ from dynakin.arrays import runs, widened
 from dynakin.filter.contacts import ContactLoads
 from dynakin.messages import Message, warning
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE
-from dynakin.recordings.times import step_of
+from dynakin.recordings.times import span, step_of
 from dynakin.results.naming import listed
 
 Array = npt.NDArray[np.float64]
@@ -56,7 +56,7 @@ def impossible_in_words(
     """A warning on these frames (T,), some of which there are; it names no plate, because none is to blame."""
     derived = frames[:, None] & _derived(feet, soles)
     push = np.where(derived, wrench[..., 1], 0.0) / weight
-    spans = listed([f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(frames)], 4)
+    spans = listed([span(time, a, b) for a, b in runs(frames)], 4)
     return warning(
         "recording",
         f"no ground gives a foot the force that follows from the motion ({push.min():.1f} to "

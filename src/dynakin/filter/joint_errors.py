@@ -1,6 +1,7 @@
 """A model whose joints may be misplaced and turned: each error is a coordinate that stands still, so that the core's
 own derivatives say what it does to markers and moments ([derivations](derivations.md), section 17). Centres of mass of
-its segments may be displaced too: their first moments are states."""
+its segments may be displaced too: their first moments are states. What follows the joints' angles out of the upright
+posture: skin, and centres that roll."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.pose_start import bare
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.spec import free_coordinates, free_names
@@ -205,3 +207,52 @@ def _root_turned(name: str, R_B: Array, children: Sequence[_core.SegmentSpec], e
 def _along(segment: str, place: str, R: Array, vector: Array) -> Column:
     """A vector of ground axes as displacements of three of the errors' coordinates whose axes are R's columns."""
     return dict(zip(_names(segment, place), (R.T @ vector).tolist(), strict=True))
+
+
+SKIN_ANGLE_RAD = np.radians(50.0)
+"""How far a joint turns until its skin has moved three quarters of its way."""
+
+
+def followed(q: Array, calibrated: CalibratedModel) -> Array:
+    """What skin follows of the free coordinates (..., K): it saturates, and is 0 upright."""
+    free = free_coordinates(calibrated.spec)
+    return np.asarray(np.tanh((q - neutral(calibrated)[free]) / SKIN_ANGLE_RAD))
+
+
+def neutral(calibrated: CalibratedModel) -> Array:
+    """(C,) upright posture: all free coordinates 0, or as near to it as their bounds allow; of the heading with which
+    the person starts, because a pelvis' tilt and list are about axes of the laboratory."""
+    spec = calibrated.spec
+    q = np.array([c.value for c in spec.coordinates], dtype=float)
+    free = free_coordinates(spec)
+    K = len(free)
+    q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
+    axes = [axis for segment in spec.segments if floats(segment) for axis in segment.axes]
+    turns = {axis.coordinate for axis in axes if axis.kind == "rotation" and axis.direction[1]}
+    for k, place in enumerate(free):
+        if spec.coordinates[place].name in turns:
+            q[place] = calibrated.x0[k]
+    return q
+
+
+def rolls(spec: _core.ModelSpec) -> list[str]:
+    """Lengths by which the centre of a joint moves with its angle, as elements of the state."""
+    axes = [axis for segment in spec.segments for axis in segment.axes if axis.kind == "translation"]
+    return [f"length/{scale}" for scale in dict.fromkeys(a.scale for a in axes if a.coordinate and a.scale)]
+
+
+def drives(spec: _core.ModelSpec, free: npt.NDArray[np.intp]) -> Array:
+    """(S, K) 1 where a free rotation moves a segment's skin: those of its own joint and of the joints that hang on it,
+    but for the root's, which turn the whole body."""
+    place = {spec.coordinates[k].name: i for i, k in enumerate(free)}
+    index = {segment.name: k for k, segment in enumerate(spec.segments)}
+    found = np.zeros((len(index), len(place)))
+    for segment in spec.segments:
+        if floats(segment):
+            continue
+        for axis in segment.axes:
+            if axis.kind == "rotation" and axis.coordinate in place:
+                found[index[segment.name], place[axis.coordinate]] = 1.0
+                if segment.parent in index:
+                    found[index[segment.parent], place[axis.coordinate]] = 1.0
+    return found

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.filter.error_sizes import CENTRES, KINDS, Sizes
-from dynakin.results.measures.sources import MEASURED, PRIOR
+from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
 
 Array = npt.NDArray[np.float64]
 
@@ -40,6 +40,11 @@ def movement_intensity(acceleration: Array, sd: Array) -> Array:
     moves = sd > 0.0
     ratio = np.divide(acceleration, sd, out=np.zeros_like(sd), where=moves)
     return np.asarray(np.square(ratio).sum(axis=-1) / np.maximum(moves.sum(axis=-1), 1))
+
+
+def as_believed(sources: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """Codes of moments of frames whose plates were refused, by which they are no surer than if these were believed."""
+    return np.where(sources == DERIVED, MEASURED, sources).astype(np.uint8)
 
 
 Parts = dict[str, dict[str, Array]]

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
+from dynakin.filter.joint_errors import drives, followed
 from dynakin.filter.noise import soft_tissue_time_s
-from dynakin.filter.systematic import drives, followed
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates

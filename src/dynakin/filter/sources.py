@@ -20,7 +20,6 @@ from dynakin.results.measures.sources import (
     Hidden,
     contact_sources,
     out_of_sight,
-    plates_refused,
     refused_for_long,
     too_long,
 )
@@ -70,7 +69,7 @@ def with_sources(
     parents = data["joint_parent"].values
     moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
     blind = np.isnan(values_of(data, "wrench_measured")).all(axis=1)
-    refused = plates_refused(data) if feet is None else refused_for_long(data)
+    refused = refused_for_long(data)
     if feet is None:
         codes = np.where(blind | refused, DERIVED, MEASURED)[:, None]
         joints, moments = np.tile(codes, (1, len(segments))), np.tile(codes, (1, len(moved)))

@@ -18,22 +18,22 @@ from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
 from dynakin.filter.error_sizes import KINDS, OF_JOINTS, Sizes, less_sure_joints, usual_sizes
-from dynakin.filter.joint_errors import JointErrors, floats
+from dynakin.filter.joint_errors import SKIN_ANGLE_RAD, JointErrors, drives, floats, neutral, rolls
 from dynakin.filter.limbs import unseen_limbs, unsure_moments
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
-from dynakin.filter.reported_sd import BLOCKS, Parts, movement_intensity, reported
+from dynakin.filter.reported_sd import BLOCKS, Parts, as_believed, movement_intensity, reported
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
-from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.times import step_of
 from dynakin.results.estimate import values_of
-from dynakin.results.measures.sources import DERIVED, MEASURED, in_use, moment_sources, plates_refused
+from dynakin.results.measures.sources import in_use, moment_sources, plates_refused
 from dynakin.results.naming import listed, words
 from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
     import xarray as xr
+from dynakin.filter.contacts import any_off_plates, wrenches_of
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -41,10 +41,6 @@ Flags = npt.NDArray[np.bool_]
 MISFIT = 1.6
 """Times `Sizes.placed` from which a run says that a model was not scaled well: by truth 0.6 to 1.1 with the person's
 own skeleton, 2.5 to 3.2 with one scaled by hand."""
-
-
-SKIN_ANGLE_RAD = np.radians(50.0)
-"""How far a joint turns until its skin has moved three quarters of its way."""
 ROOT_SKIN = 4.0
 """Times as much skin as elsewhere counts on the segment that floats (the pelvis): what its markers do together no other
 segment contradicts. By `truth3d` its rotation was said to a third of its error (0.18 of 0.53 deg in walks)."""
@@ -239,11 +235,11 @@ class Systematic:
                 whose contacts have been used.
         """
         time = np.asarray(data["time"].values)
-        states = states_of(data)
+        states = values_of(data, "state")
         # how inertia hangs together is known at the end alone, how well it is known in each frame
         sd = values_of(data, "state_sd")[:, self._inertia]
         together = _correlation(data["final_covariance"].values[np.ix_(self._inertia, self._inertia)])
-        wrench, segments = _contacts(data)
+        wrench, segments = wrenches_of(data)
         chosen = _sampled(time)
         used = in_use(np.isfinite(values_of(data, "markers_measured")).any(axis=2), time)
         each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments, used[k]) for k in chosen]
@@ -260,7 +256,7 @@ class Systematic:
     def moments_moved(self, data: xr.Dataset, moved: Sequence[Array]) -> Array:
         """(T, C): what moments change by where coordinates, speeds and accelerations (T, C) are others by ``moved`` and
         the contacts' wrenches stay; NaN where the state is not a number."""
-        states, (wrench, segments) = states_of(data), _contacts(data)
+        states, (wrench, segments) = values_of(data, "state"), wrenches_of(data)
         change = np.hstack([values[:, self._free] for values in moved])
         K = change.shape[1]
         found = np.full((len(states), self._count), np.nan)
@@ -335,9 +331,9 @@ class Systematic:
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         own = {block: values_of(data, f"{block}_sd") for block in BLOCKS}
-        moved = self.moved_m(states_of(data))
+        moved = self.moved_m(values_of(data, "state"))
         sources = moment_sources(data)
-        sources[plates_refused(data)[:, None] & (sources == DERIVED)] = MEASURED  # no surer than if they were believed
+        sources = np.where(plates_refused(data)[:, None], as_believed(sources), sources)
         found = self.over_time(data), self.intensity(data), moved, sources
         off_plates = any_off_plates(data, self._feet)
         step_s = step_of(data["time"].values)
@@ -369,35 +365,9 @@ class Systematic:
     def intensity(self, data: xr.Dataset) -> Array:
         """(T,) `movement_intensity` of a recording, by its states and the filter's own ``accelerations_sd``."""
         K = len(self._free)
-        states = states_of(data)
+        states = values_of(data, "state")
         sd = values_of(data, "accelerations_sd")[:, self._free]
         return movement_intensity(states[:, 2 * K : 3 * K], sd)
-
-
-def states_of(data: xr.Dataset) -> Array:
-    """(T, n) of a recording."""
-    return values_of(data, "state")
-
-
-def _contacts(data: xr.Dataset) -> tuple[Array, list[str]]:
-    """Wrenches (T, F, 6) of the contacts and their segments; none where the model has no contacts."""
-    if "foot_wrench" not in data:
-        return np.zeros((len(data["time"]), 0, 6)), []
-    return np.nan_to_num(values_of(data, "foot_wrench")), [str(name) for name in data["foot_segment"].values]
-
-
-def any_off_plates(data: xr.Dataset, feet: int) -> bool:
-    """Whether some foot stands off the plates in a frame of a recording.
-
-    Args:
-        feet: how many of the contacts are feet: the first ones, declared ones follow.
-    """
-    return "foot_contact" in data and stands_off_plates(values_of(data, "foot_contact"), feet)
-
-
-def stands_off_plates(contact: npt.NDArray[np.uint8], feet: int) -> bool:
-    """The same of contacts (T, F)."""
-    return bool((contact[:, :feet] == UNMEASURED).any())
 
 
 def _differences(values: list[Array]) -> tuple[Array, Array, Array]:
@@ -423,48 +393,3 @@ def _sampled(time: Array) -> npt.NDArray[np.intp]:
 
 def _between(time: Array, known: Array, values: Array) -> Array:
     return np.array([np.interp(time, known, column) for column in values.T]).T
-
-
-def followed(q: Array, calibrated: CalibratedModel) -> Array:
-    """What skin follows of the free coordinates (..., K): it saturates, and is 0 upright."""
-    free = free_coordinates(calibrated.spec)
-    return np.asarray(np.tanh((q - neutral(calibrated)[free]) / SKIN_ANGLE_RAD))
-
-
-def neutral(calibrated: CalibratedModel) -> Array:
-    """(C,) upright posture: all free coordinates 0, or as near to it as their bounds allow; of the heading with which
-    the person starts, because a pelvis' tilt and list are about axes of the laboratory."""
-    spec = calibrated.spec
-    q = np.array([c.value for c in spec.coordinates], dtype=float)
-    free = free_coordinates(spec)
-    K = len(free)
-    q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
-    axes = [axis for segment in spec.segments if floats(segment) for axis in segment.axes]
-    turns = {axis.coordinate for axis in axes if axis.kind == "rotation" and axis.direction[1]}
-    for k, place in enumerate(free):
-        if spec.coordinates[place].name in turns:
-            q[place] = calibrated.x0[k]
-    return q
-
-
-def rolls(spec: _core.ModelSpec) -> list[str]:
-    """Lengths by which the centre of a joint moves with its angle, as elements of the state."""
-    axes = [axis for segment in spec.segments for axis in segment.axes if axis.kind == "translation"]
-    return [f"length/{scale}" for scale in dict.fromkeys(a.scale for a in axes if a.coordinate and a.scale)]
-
-
-def drives(spec: _core.ModelSpec, free: npt.NDArray[np.intp]) -> Array:
-    """(S, K) 1 where a free rotation moves a segment's skin: those of its own joint and of the joints that hang on it,
-    but for the root's, which turn the whole body."""
-    place = {spec.coordinates[k].name: i for i, k in enumerate(free)}
-    index = {segment.name: k for k, segment in enumerate(spec.segments)}
-    found = np.zeros((len(index), len(place)))
-    for segment in spec.segments:
-        if floats(segment):
-            continue
-        for axis in segment.axes:
-            if axis.kind == "rotation" and axis.coordinate in place:
-                found[index[segment.name], place[axis.coordinate]] = 1.0
-                if segment.parent in index:
-                    found[index[segment.parent], place[axis.coordinate]] = 1.0
-    return found

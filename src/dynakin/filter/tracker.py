@@ -12,14 +12,14 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
-from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.contacts import ContactLoads, stands_off_plates
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.noise import prior_factor
-from dynakin.filter.reported_sd import BLOCKS
+from dynakin.filter.reported_sd import BLOCKS, as_believed
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sources import ContactSources, LiveSight
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
-from dynakin.filter.systematic import Systematic, stands_off_plates
+from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
@@ -239,8 +239,8 @@ class Tracker:
                 rate = self._wrench_rate(step, state, wrench)
             segments = () if step is None else step.segments
             sources, used = (None, None) if step is None else (step.sources, step.used)
-            if step is not None and not step.unmeasured:  # refused plates: no surer than believed ones
-                sources = np.where(step.sources == DERIVED, MEASURED, step.sources)
+            if step is not None and not step.unmeasured:  # what is derived has refused plates
+                sources = as_believed(step.sources)
             found |= self.systematic.added(
                 found, state, covariance, wrench, segments,
                 sources=sources, off_plates=self._off_plates, late=late, used=used,
@@ -316,24 +316,6 @@ class Tracker:
         check_can_smooth(self.noise)
         return smoothed(self._run(self._filter.run_smoothed, (time, markers, wrench), (progress,), feet))
 
-    def run_lagged_arrays(
-        self,
-        time: Array,
-        markers: Array,
-        wrench: Array,
-        lag: int,
-        progress: Progress | None = None,
-        feet: ContactLoads | None = None,
-    ) -> dict[str, Array]:
-        """`run_smoothed_arrays`, where each frame is smoothed from those until ``lag`` frames later alone: what
-        `delayed` gives of it, with its deviations. The last frames are estimated from those that there are.
-
-        Raises:
-            ConfigError, DivergenceError: as `run_smoothed_arrays`.
-        """
-        check_can_smooth(self.noise)
-        return smoothed(self._run(self._filter.run_lagged, (time, markers, wrench), (lag, progress), feet))
-
     def run_late_arrays(
         self,
         lag: int | None,
@@ -343,7 +325,8 @@ class Tracker:
         progress: Progress | None = None,
         feet: ContactLoads | None = None,
     ) -> dict[str, Array]:
-        """Each frame estimated with this lag (frames; None: smoothed; 0: as `run_arrays`).
+        """Each frame estimated from those until ``lag`` frames later: what `delayed` gives of it, with its deviations,
+        and the last frames from those that there are. None: `run_smoothed_arrays`; 0: `run_arrays`.
 
         Raises:
             ConfigError, DivergenceError: as `run_smoothed_arrays`.
@@ -352,7 +335,8 @@ class Tracker:
             return self.run_smoothed_arrays(time, markers, wrench, progress, feet)
         if not lag:
             return self.run_arrays(time, markers, wrench, progress, feet)
-        return self.run_lagged_arrays(time, markers, wrench, lag, progress, feet)
+        check_can_smooth(self.noise)
+        return smoothed(self._run(self._filter.run_lagged, (time, markers, wrench), (lag, progress), feet))
 
     def _run(
         self,

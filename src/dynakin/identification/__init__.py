@@ -6,9 +6,9 @@ from dynakin.lazy import loaded_when_asked
 
 if TYPE_CHECKING:
     from dynakin.identification.batch import Posterior, identify_batch
-    from dynakin.identification.change import Change, change_between
     from dynakin.identification.decision import Decision
     from dynakin.identification.inertial_parameters import InertialParameters, InertialPriors
+    from dynakin.identification.report import Change, change_between
     from dynakin.identification.subject import identify_subject
     from dynakin.identification.trials import measure_all
 

@@ -73,7 +73,7 @@ class InertialParameters:
     inertia: tuple[str, ...] = INERTIA_NAMES
 
     @classmethod
-    def of(cls, initial: CalibratedModel, priors: InertialPriors | None = None) -> InertialParameters:
+    def of(cls, initial: CalibratedModel) -> InertialParameters:
         """The segments of a calibrated model, in the plane or in space, by the numbers of each that it estimates; those
         that are held keep their mass.
 
@@ -83,7 +83,7 @@ class InertialParameters:
         """
         chosen = [segment for segment in initial.spec.segments if any(segment.inertia_estimated)]
         held = sum(float(s.inertia[0]) for s in initial.spec.segments if not any(s.inertia_estimated))
-        names, total, priors = tuple(s.name for s in chosen), initial.weighed_kg - held, priors or InertialPriors()
+        names, total, priors = tuple(s.name for s in chosen), initial.weighed_kg - held, InertialPriors()
         flags = {tuple(segment.inertia_estimated) for segment in chosen}
         wanted = {name for flag in flags for name, on in zip(INERTIA_NAMES, flag, strict=True) if on}
         if len(flags) == 1 and wanted == set(PLANAR_INERTIA):

@@ -1,4 +1,5 @@
-"""What an identification says, in sentences: what moved, how sure, and of what the data said nothing."""
+"""What an identification says, in sentences: what moved, how sure, of what the data said nothing, and what changed
+between two sessions."""
 
 from __future__ import annotations
 
@@ -7,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.errors import ModelError
 from dynakin.identification.batch import Posterior
 from dynakin.identification.decision import Decision
-from dynakin.identification.observability.base import base_spread
-from dynakin.model.identified import Batch
+from dynakin.identification.observability.structure import base_spread
+from dynakin.model.identified import Batch, IdentifiedSubject
 from dynakin.results.measures.posterior import judged
 from dynakin.results.naming import listed, number, words
 
@@ -90,4 +92,61 @@ def base_in_words(batch: Batch) -> list[str]:
     none = [batch.base_names[k].removeprefix("inertia/") for k in range(len(share)) if verdicts[k] == "nothing"]
     if none:
         said.append(f"The data say nothing of the sums named after {listed(none, 30)}: these lean on the table.")
+    return said
+
+
+ROUNDING = 1e-9
+"""Of a number (SI), what no session can show: a total mass that is given has no deviation, and differs by 1e-14."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """One base parameter: before, after and their difference (SI); ``sd`` of the difference, sqrt of the sum of both
+    variances. Both sessions lean on the same table, whose error is common to them, so ``sd`` is rather too large."""
+
+    words: str
+    before: float
+    after: float
+    sd: float
+
+    @property
+    def difference(self) -> float:
+        """After less before."""
+        return self.after - self.before
+
+    @property
+    def clear(self) -> bool:
+        """Whether the difference is beyond two of its standard deviations, and more than rounding."""
+        return abs(self.difference) > 2.0 * self.sd + ROUNDING * max(1.0, abs(self.before), abs(self.after))
+
+
+def change_between(before: IdentifiedSubject, after: IdentifiedSubject) -> list[Change]:
+    """Changes, the clearest first; sums by the first session's geometry.
+
+    Raises:
+        ModelError: the two are not of the same model.
+    """
+    if before.model != after.model or before.batch.names != after.batch.names:
+        raise ModelError(f"two sessions: models {before.model} and {after.model}, expected the same model in both")
+    K = np.array(before.batch.K)
+    first, second = (K @ np.array(subject.batch.values) for subject in (before, after))
+    spread = np.array(before.batch.covariance) + np.array(after.batch.covariance)
+    sd = base_spread(K, spread)
+    found = [
+        Change(words, float(a), float(b), float(s))
+        for words, a, b, s in zip(before.batch.base_words, first, second, sd, strict=True)
+    ]
+    return sorted(found, key=lambda change: -abs(change.difference) / max(change.sd, 1e-300))
+
+
+def change_in_words(changes: list[Change], masses: tuple[float, float]) -> list[str]:
+    """Sentences."""
+    clear = [change for change in changes if change.clear]
+    said = [f"Mass {masses[0]:.2f} kg before, {masses[1]:.2f} kg after ({masses[1] - masses[0]:+z.2f} kg)."]
+    if not clear:
+        return [*said, f"None of {len(changes)} base parameters changed by more than two standard deviations."]
+    said.append(f"{len(clear)} of {len(changes)} base parameters changed by more than two standard deviations:")
+    said += [
+        f"{c.words}: {number(c.before)} to {number(c.after)} ({c.difference:+.3g}, sd {number(c.sd)})" for c in clear
+    ]
     return said

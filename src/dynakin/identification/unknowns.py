@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
-from dynakin.identification.inertial_parameters import InertialParameters, InertialPriors
+from dynakin.identification.inertial_parameters import InertialParameters
 from dynakin.identification.trials import Common
 
 Array = npt.NDArray[np.float64]
@@ -64,22 +64,14 @@ class Unknowns:
     free: npt.NDArray[np.bool_]
 
     @classmethod
-    def of(
-        cls,
-        common: Common,
-        *,
-        inertia: bool = True,
-        geometry: bool = True,
-        inertial_priors: InertialPriors | None = None,
-        priors: GeometryPriors | None = None,
-    ) -> Unknowns:
+    def of(cls, common: Common, *, inertia: bool = True, geometry: bool = True) -> Unknowns:
         """All of a measured model's; ``inertia`` and ``geometry`` say what is free.
 
         Raises:
             ModelError: the model does not estimate what can be identified.
         """
-        priors = priors or GeometryPriors()
-        inertial = InertialParameters.of(common.initial, inertial_priors)
+        priors = GeometryPriors()
+        inertial = InertialParameters.of(common.initial)
         names = list(common.core.layout.names)
         turning = {
             axis.coordinate

@@ -20,9 +20,10 @@ from dynakin.model.calibration.calibrated import (
 )
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import Asked, measure, told_of_the_static
+from dynakin.model.markers.fit import choose_marker_set, lacking
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
-from dynakin.model.markers.recognise import choose_marker_set, lacking, recognise
+from dynakin.model.markers.recognise import recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
@@ -173,7 +174,7 @@ class ModelDefinition:
             try:
                 match = recognise(recording).match  # places are guessed
             except ModelError:
-                raise ModelError(f"{error.message}; what came: {', '.join(came)}", asks_for=error.asks_for) from None
+                raise error.reworded(f"{error.message}; what came: {', '.join(came)}") from None
         usual = {marker.name: marker for marker in match.marker_set.usual}
         sides = ("right", "left", "centre")
         expected = [marker.aliases(side)[0] for marker in usual.values() for side in sides if marker.aliases(side)]

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from dynakin.messages import Message, note, warning
+from dynakin.messages import Findings, Message, note, warning
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import COP_REFUSED_M, NEAR_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
@@ -20,7 +20,7 @@ from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
-from dynakin.recordings.weight import TILT_WARNING_DEG, Findings, check_steps, check_weight, likely_unit, while_loaded
+from dynakin.recordings.weight import TILT_WARNING_DEG, check_steps, check_weight, likely_unit, while_loaded
 
 ABOVE_SURFACE_M = (-0.01, SHOE_M)
 """Height of a foot's lowest marker over the centre of pressure under it, in a quarter of its load: 17 to 78 mm in 18
@@ -89,7 +89,7 @@ def check_plates(
     """
     if not recording.plates:
         return PlateCheck(None, None, (), "no force plates in this recording, expected at least one")
-    findings = Findings()
+    findings = Findings("plates")
     standing = _on_plates(standing_window(recording), recording, ground)
     if not np.all([np.isfinite(plate.force).all(axis=1) for plate in recording.plates], axis=0).any():
         findings.warn(

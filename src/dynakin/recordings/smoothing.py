@@ -10,8 +10,8 @@ import numpy.typing as npt
 import scipy
 
 from dynakin.arrays import runs
-from dynakin.errors import RecordingError
 from dynakin.recordings.resampling import low_pass
+from dynakin.recordings.times import even_step
 from dynakin.settings.defaults import CUTOFF_HZ
 
 Array = npt.NDArray[np.float64]
@@ -80,25 +80,6 @@ def smooth(
             values[first:end, k] = part
             rates[first:end, k], seconds[first:end, k] = spline.derivative(1)(at), spline.derivative(2)(at)
     return Smoothed(values, rates, seconds, tuple(notes))
-
-
-def even_step(time: Array) -> float:
-    """Time step (s) of evenly spaced frames; times rounded by a file are even enough.
-
-    Raises:
-        RecordingError: a frame lies more than half a step off, as after dropped frames, or there are fewer than two.
-    """
-    if len(time) < 2:
-        raise RecordingError(f"low-pass and derivatives: {len(time)} frames, expected at least two")
-    step = float((time[-1] - time[0]) / (len(time) - 1))
-    off = np.abs(time - time[0] - step * np.arange(len(time)))
-    if not step > 0.0 or off.max() > 0.5 * step:
-        k = int(np.argmax(off))
-        raise RecordingError(
-            f"frame {k + 1} ({time[k]:.4f} s) lies {1000 * off[k]:.1f} ms off an even spacing of {1000 * step:.2f} ms; "
-            "low-pass and derivatives expect evenly spaced frames"
-        )
-    return step
 
 
 def fill_gaps(signal: Array, max_frames: int) -> tuple[Array, Mask]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
-from dynakin.messages import Message, Topic, note, warning
+from dynakin.messages import Findings
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.pressure import JUDGED_N
@@ -48,26 +46,6 @@ def while_loaded(push: Array) -> float:
     """Mean of the larger half of a vertical force (T,)."""
     upward = np.nan_to_num(push)
     return float(upward[upward >= 0.5 * upward.max()].mean())
-
-
-@dataclass
-class Findings:
-    """What is said of plates, and why they cannot be used."""
-
-    messages: list[Message] = field(default_factory=list)
-    refusals: list[str] = field(default_factory=list)
-
-    def say(self, text: str, topic: Topic = "plates") -> None:
-        """A note."""
-        self.messages.append(note(topic, text))
-
-    def warn(self, text: str, topic: Topic = "plates") -> None:
-        """A warning."""
-        self.messages.append(warning(topic, text))
-
-    def refuse(self, text: str) -> None:
-        """A reason for which they cannot be used."""
-        self.refusals.append(text)
 
 
 def check_weight(

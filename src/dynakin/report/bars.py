@@ -8,7 +8,7 @@ from html import escape
 from math import isfinite
 
 from dynakin.report.chart import Panel
-from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
+from dynakin.report.styles import ESTIMATED, INK, MEASURED, QUIET
 
 # Tenths of a point, as in a chart; a column of the page is 3096 wide.
 _WIDTH, _LETTER, _BASE, _GAP = 3096, 46, 28, 40

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.report.labels import is_planar
 from dynakin.report.styles import SIDE_COLOURS, segment_colours, side_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import words
@@ -46,7 +45,7 @@ def painted(estimate: Estimate, chain: Chain) -> tuple[dict[str, str], dict[str,
     """Colour of each segment that is drawn or carries a marker, and the words of a key with theirs: in a plane each its
     own; in space its side's, because thirty segments in six colours say nothing."""
     segments = dict.fromkeys([*(bone.segment for bone in chain.bones), *estimate.marker_segments.values()])
-    if is_planar(estimate):
+    if estimate.planar:
         colours = colours_of(estimate)
         return colours, {words(bone.segment): colours[bone.segment] for bone in chain.bones}
     return (

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import runs
-from dynakin.report.plot import GRID, LIMIT, by_source, thin
+from dynakin.report.styles import GRID, LIMIT, by_source, thin
 from dynakin.results.measures.sources import MEASURED
 
 Array = npt.NDArray[np.float64]

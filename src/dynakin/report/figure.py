@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from dynakin.report.plot import GRID, INK, QUIET, by_source, thin
+from dynakin.report.styles import GRID, INK, QUIET, by_source, thin
 
 _STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",

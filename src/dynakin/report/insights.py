@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from dynakin.messages import Topic
-from dynakin.report.findings import fit, forces, recording, run, said, uncertainty
+from dynakin.report.findings import fit, forces, recording, said, uncertainty
 from dynakin.report.findings.finding import Insight, Metrics
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import listed, plural, sentence
@@ -46,7 +46,7 @@ def insights(estimate: Estimate, metrics: Metrics) -> list[Insight]:
 FINDINGS: tuple[tuple[Callable[[Estimate, Metrics], Insight | list[Insight] | None], tuple[str, ...]], ...] = (
     (said.warned, ()),
     (forces.left, ("feet",)),
-    (run.failed, ()),
+    (recording.failed, ()),
     (forces.moments, ("moments",)),
     (fit.markers, ("markers",)),
     (forces.wrench, ("wrench",)),
@@ -60,7 +60,7 @@ FINDINGS: tuple[tuple[Callable[[Estimate, Metrics], Insight | list[Insight] | No
     (fit.joint_limits, ()),
     (recording.missing, ("events",)),
     (recording.gated, ()),
-    (run.locked, ()),
-    (run.step_time, ()),
+    (recording.locked, ()),
+    (recording.step_time, ()),
 )
 """What looks for each finding, and the blocks of the metrics that it needs."""

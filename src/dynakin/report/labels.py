@@ -25,14 +25,9 @@ def short_marker_names(names: list[str]) -> dict[str, str]:
     return {name: name.rpartition(":")[2] if strip else name for name in names}
 
 
-def is_planar(estimate: Estimate) -> bool:
-    """Whether the model explains the markers in one plane only."""
-    return int(estimate.modelled_axes().sum()) == 2
-
-
 def moment_note(estimate: Estimate, coordinate: str) -> str:
     """What a moment of a planar model stands for: it has the ground for a joint and one leg for two."""
-    if not is_planar(estimate):
+    if not estimate.planar:
         return ""
     if coordinate == "toe":
         return "the ground’s moment about the toe"

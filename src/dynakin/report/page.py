@@ -11,7 +11,7 @@ import jinja2
 import tomli_w
 
 from dynakin.report.insights import in_short, insights
-from dynakin.report.labels import is_planar, parameter_label, short_marker_names
+from dynakin.report.labels import parameter_label, short_marker_names
 from dynakin.report.playback import playback
 from dynakin.report.sections.constants import length_section, mass_section, observability_section
 from dynakin.report.sections.forces import foot_section, mass_centre_section, wrench_section
@@ -152,7 +152,7 @@ _KINDS = {"length": "lengths", "marker": "marker places", "inertia": "masses and
 def _parameter_groups(estimate: Estimate) -> list[dict[str, Any]]:
     """One table, or, where it would be too long to find anything in, one a kind."""
     rows = _parameter_rows(estimate)
-    if is_planar(estimate):
+    if estimate.planar:
         return [{"title": "Every parameter", "rows": rows}]
     kinds = dict.fromkeys(row["kind"] for row in rows)
     return [

@@ -15,10 +15,9 @@ import numpy.typing as npt
 from markupsafe import Markup
 
 from dynakin.report.body import chain_of, painted
-from dynakin.report.labels import is_planar, short_marker_names
-from dynakin.report.plot import INK, MEASURED
+from dynakin.report.labels import short_marker_names
 from dynakin.report.sides import Joint, joints_of, normalising_mass
-from dynakin.report.styles import SIDE_COLOURS
+from dynakin.report.styles import INK, MEASURED, SIDE_COLOURS
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import reported
 from dynakin.results.measures.feet import foot_sources
@@ -78,7 +77,7 @@ class Playback:
 
 def playback(estimate: Estimate) -> Playback:
     """The player's content; segments where the estimate holds joint centres, arrows where it holds wrenches."""
-    planar, mass = is_planar(estimate), normalising_mass(estimate)
+    planar, mass = estimate.planar, normalising_mass(estimate)
     chain, joints = chain_of(estimate), joints_of(estimate)
     colours, key = painted(estimate, chain)
     measured, estimated = (_seen(estimate, estimate.values(f"markers_{k}")) for k in ("measured", "estimated"))
@@ -155,7 +154,7 @@ def _view(estimate: Estimate, every: Array) -> tuple[dict[str, Any], Array]:
     top = float(np.nanmax(heights)) if known.any() else floor + 1000.0
     low = min(float(np.nanmin(heights)), floor) if known.any() else floor
     radius = max(round(float(np.nanmax(away))) if known.any() else 500, 300)
-    turns = not is_planar(estimate)
+    turns = not estimate.planar
     azimuth, elevation = _VIEWS["Aslant" if turns else "Right"]
     return {
         "azimuth": azimuth,

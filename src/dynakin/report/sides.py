@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.report.labels import is_planar
 from dynakin.report.styles import ESTIMATED_LINE, SIDE_COLOURS, LineStyle, side_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.power import root_coordinates
@@ -23,7 +22,7 @@ REGIONS = ("Legs", "Trunk and head", "Arms", "Whole body")
 
 def side_lines(estimate: Estimate) -> dict[str, LineStyle]:
     """Line of the right, the left and the middle; in a plane that of the estimate."""
-    if is_planar(estimate):
+    if estimate.planar:
         return {"": ESTIMATED_LINE}
     return {side: LineStyle(side, colour, 1.2, band=True) for side, colour in SIDE_COLOURS.items()}
 
@@ -35,7 +34,7 @@ def side_key(estimate: Estimate) -> tuple[LineStyle, ...]:
 
 def normalising_mass(estimate: Estimate) -> float | None:
     """Body mass, kg, that the page divides moments and powers by; None in a plane, whose limbs are both sides'."""
-    return None if is_planar(estimate) else estimate.mass_kg
+    return None if estimate.planar else estimate.mass_kg
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ def joints_of(estimate: Estimate) -> list[Joint]:
     In a plane the locked ones as well, and each by itself.
     """
     names, rotation = estimate.coordinate_names, estimate.is_rotation()
-    if is_planar(estimate):
+    if estimate.planar:
         return [Joint(name, {"": k}, "", bool(rotation[k])) for k, name in enumerate(names)]
     pairs = {k: (stem, right, left) for stem, right, left in paired(names) for k in (right, left)}
     root, legs = root_coordinates(estimate), legs_of(estimate.data)

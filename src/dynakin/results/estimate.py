@@ -151,6 +151,11 @@ class Estimate:
         return np.asarray(self.data["marker_axes_modelled"].values, dtype=bool)
 
     @property
+    def planar(self) -> bool:
+        """Whether the model explains the markers in one plane only."""
+        return not self.modelled_axes().all()
+
+    @property
     def foot_names(self) -> list[str]:
         """The feet whose wrenches the moments were made with; none in a model that stands on its root."""
         declared = self.data.coords.get("foot_declared")

@@ -113,11 +113,11 @@ def read_preset(path: Path) -> Noise:
     try:
         start = _built_in(base)  # not another file, which could name this one
     except ConfigError as error:
-        raise ConfigError(f"{path}: base: {error.message}") from None
+        raise error.reworded(f"{path}: base: {error.message}") from None
     try:
         return start.changed(**({"adapt": False} | noise))
     except ConfigError as error:
-        raise ConfigError(f"{path}: {error.message}") from None
+        raise error.reworded(f"{path}: {error.message}") from None
 
 
 def write_preset(path: Path, noise: Noise, base: str, remarks: Sequence[str] = ()) -> None:

@@ -35,7 +35,7 @@ class Subject(_Fields):
         try:
             checked = validate(_Fields, fields, "subject")
         except ModelError as error:
-            raise ModelError(error.message + _hint(fields)) from None
+            raise error.reworded(error.message + _hint(fields)) from None
         super().__init__(**checked.model_dump())
 
 

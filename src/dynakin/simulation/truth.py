@@ -15,8 +15,8 @@ from dynakin.simulation.bodies.subject import SimulatedSubject
 from dynakin.simulation.contacts import MechanicalState
 from dynakin.simulation.mechanics import Segment
 from dynakin.simulation.motions.movement import Repetition
-from dynakin.simulation.sensors.faults import Fault
 from dynakin.simulation.sensors.plates import PlateErrors
+from dynakin.simulation.sensors.sensed_markers import Fault
 from dynakin.units import COMPONENTS
 
 Array = NDArray[np.float64]

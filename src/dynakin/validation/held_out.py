@@ -27,11 +27,11 @@ from dynakin.results.measures.tracking import why_lost, without_lost
 from dynakin.settings.lag import frames_later, known_lag
 from dynakin.settings.model import Bounds, Priors
 from dynakin.units import COMPONENTS
+from dynakin.validation.case import Setup
 from dynakin.validation.freeze import final_values, freeze, initial_values
 from dynakin.validation.reference.inverse_dynamics import inverse_name, rigid_motions, usual_cutoffs
 from dynakin.validation.reference.least_squares import identify, predicted_wrench
 from dynakin.validation.reference.methods import reference_methods
-from dynakin.validation.setup import Setup
 from dynakin.validation.table2 import Row, spread, unit_of
 
 Array = npt.NDArray[np.float64]

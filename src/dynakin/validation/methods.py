@@ -32,6 +32,7 @@ from dynakin.results.measures.tracking import why_lost
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.lag import in_words
 from dynakin.units import COMPONENTS
+from dynakin.validation.case import Setup
 from dynakin.validation.reference.inverse_dynamics import (
     INVERSE,
     inverse_name,
@@ -40,7 +41,6 @@ from dynakin.validation.reference.inverse_dynamics import (
     with_plates,
 )
 from dynakin.validation.reference.methods import Lengths, Reference, reference_methods
-from dynakin.validation.setup import Setup
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -229,7 +229,7 @@ def trial_of(
     turned = {preset: facing(estimate) for preset, estimate in estimates.items()}
     methods = [_method(f"EKF ({preset})", "EKF", estimate.data) for preset, estimate in turned.items()]
     given, first = next(iter(estimates.values())), next(iter(turned.values()))
-    notes, in_space = how_estimated(estimates), bool(first.modelled_axes().all())
+    notes, in_space = how_estimated(estimates), not first.planar
     try:
         if not in_space:
             methods += _in_plane(first, initial, definition, cutoff_hz, notes)

@@ -21,8 +21,8 @@ from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.settings.defaults import HORIZON_S
 from dynakin.units import COMPONENTS
+from dynakin.validation.case import Setup
 from dynakin.validation.held_out import halves, identify_on, judge, predict_blind
-from dynakin.validation.setup import Setup
 from dynakin.validation.table2 import MARKERS, Spread, spread, unit_of
 from dynakin.validation.unseen_in_space import figures_in_space
 from dynakin.validation.yardsticks import (

@@ -23,6 +23,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.units import COMPONENTS
+from dynakin.validation.case import Setup
 from dynakin.validation.reference.inverse_dynamics import (
     RigidMotion,
     filled,
@@ -30,7 +31,6 @@ from dynakin.validation.reference.inverse_dynamics import (
     rigid_motions,
     usual_cutoffs,
 )
-from dynakin.validation.setup import Setup
 from dynakin.validation.yardsticks import (
     LEFT_OUT,
     LINEAR,

@@ -11,11 +11,10 @@ import pytest
 from dynakin import load_model
 from dynakin.bindings import _core
 from dynakin.errors import DynakinError, ModelError
-from dynakin.identification.observability.base import base_of, identified_alone, in_no_base_parameter
 from dynakin.identification.observability.element_words import base_words
 from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.identification.observability.simulated import tracker_of
-from dynakin.identification.observability.structure import structure_of
+from dynakin.identification.observability.structure import base_of, identified_alone, in_no_base_parameter, structure_of
 from support.identifiability import changed_model
 
 FIXED_FOOT = (

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.model.opensim.coupled import coupled_of, in_radians
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.model.opensim.read import read_osim
+from dynakin.model.opensim.spec import coupled_of, in_radians
 from dynakin.recordings.formats.mot import read_table
 from dynakin.results.files.motion import write_coordinates
 from support.osim.files import COUPLER, small_model

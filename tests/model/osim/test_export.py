@@ -16,9 +16,9 @@ from dynakin.filter.build import definition_of
 from dynakin.model.identified import read_constants
 from dynakin.model.opensim.definition import scale_names
 from dynakin.model.opensim.description import OpenSimModel
+from dynakin.model.opensim.export import identified
 from dynakin.model.opensim.from_core import from_core
 from dynakin.model.opensim.functions import constant, is_constant
-from dynakin.model.opensim.identified import identified
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.spec import to_spec
 from dynakin.model.opensim.write import write_osim

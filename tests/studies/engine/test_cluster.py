@@ -46,6 +46,6 @@ def test_a_worker_that_is_killed_on_the_way_changes_nothing(cluster):
 
 
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch):
-    monkeypatch.setattr("dynakin.studies.engine.cluster.TIMEOUT_S", 0.5)
+    monkeypatch.setattr("dynakin.studies.engine.pools.TIMEOUT_S", 0.5)
     with pytest.raises(ConfigError, match=r"--scheduler tcp://127\.0\.0\.1:9: no scheduler answers"):
         open_pool("dask", scheduler="tcp://127.0.0.1:9")

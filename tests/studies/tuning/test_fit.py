@@ -15,9 +15,9 @@ from dynakin.simulation.trial import simulate
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.tuning.fit import Fit, Fitter, belongs_to_fit, usual_names
-from dynakin.studies.tuning.in_words import recommendation
 from dynakin.studies.tuning.likelihood import REACH, Likelihood
 from dynakin.studies.tuning.optimise import curvature, deviations, minimise
+from dynakin.studies.tuning.output import recommendation
 from dynakin.studies.tuning.score import Shared
 from support.own_data import own_noise, own_trial
 

@@ -17,9 +17,9 @@ from dynakin.model.spec import free_names
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
+from dynakin.validation.case import Setup
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.reference.inverse_dynamics import INVERSE, RigidMotion, inverse_name, rigid_motions
-from dynakin.validation.setup import Setup
 
 FLEXION = [f"{joint}_{side}" for joint in ("hip_flexion", "knee_angle", "ankle_angle") for side in "rl"]
 

@@ -11,9 +11,8 @@ import numpy.typing as npt
 from dynakin.filter.augment import variance_scales
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.advice import advice_in_words, gains_of
-from dynakin.identification.observability.base import base_of, base_spread
 from dynakin.identification.observability.excitation import Bench, Excitation
-from dynakin.identification.observability.structure import Structure, structure_of
+from dynakin.identification.observability.structure import Structure, base_of, base_spread, structure_of
 from dynakin.progress import Progress
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.posterior import judged, posterior_figures, share_of

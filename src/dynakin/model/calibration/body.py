@@ -13,7 +13,7 @@ from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.completion import Proportions
 from dynakin.model.calibration.frames import Trial
-from dynakin.model.calibration.landmarks import LandmarkFinder
+from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.loads import FootLoads
@@ -326,3 +326,19 @@ def _over_the_foot(trial: Trial, tops: list[Array]) -> Array:
     speed = np.linalg.norm(np.gradient(places, time, axis=0), axis=2)[np.arange(len(time)), lowest]
     still = seen & (speed < _STANDS_M_S)  # NaN next to a gap: not known to be still
     return np.asarray(over[still if still.any() else seen])
+
+
+def joint_widths(entries: list[Recording], finder: LandmarkFinder) -> tuple[dict[str, float], list[Message]]:
+    """Widths (m) of knee and ankle by joint and side ("knee_r") as recordings say them, and a sentence where used."""
+    keys = {f"{joint}_{side[0]}": side for joint in ("knee", "ankle") for side in SIDES}
+    found: dict[str, float] = {}
+    for key in keys:
+        joint, side = key.split("_")
+        given = [e.subject[f"{joint}_width_m_{side}"] for e in entries if f"{joint}_width_m_{side}" in e.subject]
+        recipe = finder.recipe(joint, keys[key])
+        if given and recipe is not None and recipe.offset is not None and recipe.offset.width == joint:
+            found[key] = given[0]
+    if not found:
+        return {}, []
+    words = ", ".join(f"{keys[key]} {key.split('_')[0]} {1000.0 * width:.0f} mm" for key, width in found.items())
+    return found, [note("calibration", f"Joint widths: the recording's own ({words}).")]

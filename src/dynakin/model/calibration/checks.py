@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.inertia import RigidBody
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
+from dynakin.model.table import BodyTable
 
 Array = npt.NDArray[np.float64]
 
@@ -175,3 +177,36 @@ def fixed_lengths(model: ModelFile, bare: set[str], added: set[str]) -> frozense
 
 def _estimated(model: ModelFile, name: str) -> bool:
     return next(length.estimated for length in model.lengths if length.name == name)
+
+
+def unmeasured_lengths(
+    path: Path,
+    model: ModelFile,
+    table: BodyTable,
+    landmarks: dict[str, Array],
+    height_m: float | None,
+    messages: list[Message],
+) -> dict[str, float]:
+    """Lengths, m, whose landmarks no marker shows: by the height and the table.
+
+    Raises:
+        ModelError: neither gives one of them.
+    """
+    found: dict[str, float] = {}
+    for length in model.lengths:
+        if length.between is None or all(name in landmarks for pair in length.pairs() for name in pair):
+            continue
+        part = table.parts.get(length.name)
+        if part is None or part.length_per_height is None or height_m is None:
+            raise ModelError(
+                f"{path}: length {length.name!r}: its landmarks {' and '.join(length.between)} are not measured, "
+                f"and neither the table {table.name} nor the subject's height gives it"
+            )
+        found[length.name] = part.length_per_height * height_m
+        messages.append(
+            note(
+                "calibration",
+                f"Length {length.name}: {1000 * found[length.name]:.0f} mm from the height ({table.name}), no markers.",
+            )
+        )
+    return found

@@ -18,13 +18,13 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note
+from dynakin.model.calibration.joint_motion import nearest_rotation
 from dynakin.model.calibration.landmarks import BENT, Positions
 from dynakin.model.calibration.posture import frame_landmarks
 from dynakin.model.markers.anatomy import standing_at
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.schema import Frame, ModelFile, Segment
 from dynakin.model.table import BodyTable
-from dynakin.recordings.rigidity import nearest_rotation
 
 Array = npt.NDArray[np.float64]
 

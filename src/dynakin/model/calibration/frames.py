@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
+from dynakin.messages import Message, note
 from dynakin.model.calibration.landmarks import SIDES, Positions
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.recordings.frame import GroundFrame
@@ -114,6 +115,13 @@ class Trial:
             first,
             f"the first {len(first)} usable frames of {self.recording.name} ({t0:.2f} to {t1:.2f} s; {why})",
         )
+
+    def late_start(self, first: int) -> list[Message]:
+        """A note where this is not the first frame."""
+        if not first:
+            return []
+        when = f"frame {first} ({self.recording.time[first]:.2f} s)"
+        return [note("details", f"Start from {when}: markers are missing before.")]
 
 
 def _median(places: Array) -> Array:

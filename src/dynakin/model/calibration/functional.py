@@ -15,16 +15,18 @@ from dynakin.model.calibration.joint_motion import (
     Centre,
     JointAxis,
     JointMotion,
+    RigidMotion,
     angle_deg,
+    distance_sd_m,
     joint_axis,
     joint_centre,
+    rigid_motion,
 )
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.markers.match import match_markers
 from dynakin.recordings.companions import another_person
 from dynakin.recordings.landmarks import find_marker
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.rigidity import RigidMotion, distance_sd_m, rigid_motion
 
 Array = npt.NDArray[np.float64]
 

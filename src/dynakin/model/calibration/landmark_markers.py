@@ -12,8 +12,8 @@ from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.posture import frame_landmarks
 from dynakin.model.calibration.sites import as_marked, candidates, find_locks
+from dynakin.model.markers.fit import lacking
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
-from dynakin.model.markers.recognise import lacking
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
 

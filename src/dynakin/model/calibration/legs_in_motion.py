@@ -31,7 +31,8 @@ from dynakin.model.calibration.functional import (
 from dynakin.model.calibration.joint_motion import Centre, JointMotion, joint_axis, joint_centre
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.sites import Candidate
-from dynakin.model.markers.recognise import CORRECT, LEG
+from dynakin.model.markers.fit import LEG
+from dynakin.model.markers.recognise import CORRECT
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import listed, words
 

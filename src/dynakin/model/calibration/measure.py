@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from dynakin.errors import DynakinError, ModelError
 from dynakin.messages import Message, note, warning
-from dynakin.model.calibration.body import check_body_mass, doubtful_height, find_height, find_mass
+from dynakin.model.calibration.body import check_body_mass, doubtful_height, find_height, find_mass, joint_widths
 from dynakin.model.calibration.checks import (
     check_masses,
     check_standing,
@@ -20,6 +20,7 @@ from dynakin.model.calibration.checks import (
     reach,
     refuse_moving_origin,
     report,
+    unmeasured_lengths,
 )
 from dynakin.model.calibration.completion import Completed, completed
 from dynakin.model.calibration.flat_feet import flat_slopes, never_flat, raised_heels, usual_slopes
@@ -31,8 +32,9 @@ from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, Legs, legs_in_m
 from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
+from dynakin.model.markers.fit import refuse_unfit
 from dynakin.model.markers.match import MarkerKey, MarkerMatch, without_prefix
-from dynakin.model.markers.recognise import recognise, refuse_unfit
+from dynakin.model.markers.recognise import recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
@@ -142,7 +144,7 @@ def told_of_the_static(recording: Recording, static: Recording | None) -> Iterat
         if static is None or not other:
             raise
         text = f"{refusal.message}. Of the standing trial {static.path or static.name}: {other}"
-        raise type(refusal)(text, asks_for=refusal.asks_for) from None
+        raise refusal.reworded(text) from None
 
 
 def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
@@ -177,7 +179,7 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
         ground = trials.trial.ground
         other, _ = against_vertical(asked.recording, ground.vertical, trials.trial.match.facing_pairs)
         why = f"; vertical is {ground.vertical}, but the markers show {other}" if other else ""
-        raise ModelError(f"{error.message}{why}", asks_for=error.asks_for) from None
+        raise error.reworded(f"{error.message}{why}") from None
     if subject.sex is None:
         messages.append(
             note(
@@ -185,7 +187,7 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
                 "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors).",
             )
         )
-    unmeasured = _unmeasured_lengths(asked.path, model, table, found.landmarks, height_m, messages)
+    unmeasured = unmeasured_lengths(asked.path, model, table, found.landmarks, height_m, messages)
     geometry, posture = find_geometry(model, found.landmarks, locks, unmeasured)
     on_frames = (still.source, posture, still.frames)
     sites, placed = place_sites(marked.chosen, on_frames, still.trial, finder, geometry, model, marked.needed)
@@ -272,7 +274,7 @@ def _marked(asked: Asked, trials: _Trials, messages: list[Message]) -> _Marked:
     if model.sided:
         height = find_height(asked.subject, asked.recordings, source, finder)
         finder.height_m = height[0]
-        finder.widths_m, said = _joint_widths(asked.recordings, finder)
+        finder.widths_m, said = joint_widths(asked.recordings, finder)
         messages += said
     return _Marked(model, finder, chosen, locks, bare, height, needed_markers(model, finder, locks))
 
@@ -317,7 +319,7 @@ def _landmarks(
         found = completed(model, asked.table, marked.locks, legs.landmarks, standing, height_m, still.trial.match.where)
     except ModelError as error:
         reasons = dict.fromkeys(source.match.left_out.values())
-        raise ModelError("; ".join([error.message, *reasons]), asks_for=error.asks_for) from None
+        raise error.reworded("; ".join([error.message, *reasons])) from None
     if still.stands:
         messages += check_standing(found.landmarks, source.recording.name, given=asked.static is not None)
     supposed = supposed_legs(found, legs, marked.chosen)
@@ -379,50 +381,6 @@ def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: n
     return trial.about(trial.ground.points_to_laboratory(origin_G))
 
 
-def _joint_widths(entries: list[Recording], finder: LandmarkFinder) -> tuple[dict[str, float], list[Message]]:
-    """Widths (m) of knee and ankle by joint and side ("knee_r") as recordings say them, and a sentence where used."""
-    keys = {f"{joint}_{side[0]}": side for joint in ("knee", "ankle") for side in SIDES}
-    found: dict[str, float] = {}
-    for key in keys:
-        joint, side = key.split("_")
-        given = [e.subject[f"{joint}_width_m_{side}"] for e in entries if f"{joint}_width_m_{side}" in e.subject]
-        recipe = finder.recipe(joint, keys[key])
-        if given and recipe is not None and recipe.offset is not None and recipe.offset.width == joint:
-            found[key] = given[0]
-    if not found:
-        return {}, []
-    words = ", ".join(f"{keys[key]} {key.split('_')[0]} {1000.0 * width:.0f} mm" for key, width in found.items())
-    return found, [note("calibration", f"Joint widths: the recording's own ({words}).")]
-
-
-def _unmeasured_lengths(
-    path: Path,
-    model: ModelFile,
-    table: BodyTable,
-    landmarks: dict[str, Array],
-    height_m: float | None,
-    messages: list[Message],
-) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for length in model.lengths:
-        if length.between is None or all(name in landmarks for pair in length.pairs() for name in pair):
-            continue
-        part = table.parts.get(length.name)
-        if part is None or part.length_per_height is None or height_m is None:
-            raise ModelError(
-                f"{path}: length {length.name!r}: its landmarks {' and '.join(length.between)} are not measured, "
-                f"and neither the table {table.name} nor the subject's height gives it"
-            )
-        found[length.name] = part.length_per_height * height_m
-        messages.append(
-            note(
-                "calibration",
-                f"Length {length.name}: {1000 * found[length.name]:.0f} mm from the height ({table.name}), no markers.",
-            )
-        )
-    return found
-
-
 def _first_posture(
     model: ModelFile,
     geometry: Geometry,
@@ -436,12 +394,6 @@ def _first_posture(
     if not len(usable):
         raise ModelError(f"{trial.match.where}: no frame shows all markers of the joint centres")
     first = int(usable[0])
-    if first > 0:
-        messages.append(
-            note(
-                "details",
-                f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.",
-            )
-        )
+    messages += trial.late_start(first)
     positions = trial.median(np.array([first]))
     return find_posture(model, geometry, finder.find(positions), standing)

@@ -15,11 +15,10 @@ import numpy.typing as npt
 from dynakin.arrays import rms, wrapped
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
-from dynakin.model.calibration.joint_fit import joint_coordinates
-from dynakin.model.calibration.posture import turned
+from dynakin.model.calibration.joint_motion import nearest_rotation
+from dynakin.model.calibration.posture import joint_coordinates, turned
 from dynakin.model.schema import Interval, kinds_of
 from dynakin.model.spec import free_names
-from dynakin.recordings.rigidity import nearest_rotation
 
 Array = npt.NDArray[np.float64]
 

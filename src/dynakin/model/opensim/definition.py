@@ -26,13 +26,11 @@ from dynakin.model.opensim.calibrate import (
     reach_of,
     refuse_too_few,
 )
-from dynakin.model.opensim.coupled import coupled_of, in_radians
-from dynakin.model.opensim.description import OpenSimModel
+from dynakin.model.opensim.description import OpenSimModel, person_of
 from dynakin.model.opensim.feet import feet_of
-from dynakin.model.opensim.person import person_of
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import sites, skin_of
-from dynakin.model.opensim.spec import independent_coordinates, moved_by, to_spec, unseen
+from dynakin.model.opensim.spec import coupled_of, in_radians, independent_coordinates, moved_by, to_spec, unseen
 from dynakin.model.schema import kinds_of
 from dynakin.model.state_priors import places_prior, state_bounds, state_prior
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame

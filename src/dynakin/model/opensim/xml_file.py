@@ -60,10 +60,10 @@ class Node:
         found = self.find(name, "objects")
         return [] if found is None else found.children
 
-    def word(self, tag: str, otherwise: str = "") -> str:
-        """Text of a child."""
+    def word(self, tag: str) -> str:
+        """Text of a child, "" without one."""
         child = self.find(tag)
-        return otherwise if child is None else child.text.strip()
+        return "" if child is None else child.text.strip()
 
     def numbers(self, tag: str, count: int | None = None, otherwise: tuple[float, ...] | None = None) -> list[float]:
         """Numbers of a child, ``count`` of them where given."""

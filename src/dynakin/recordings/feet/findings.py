@@ -19,7 +19,7 @@ from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Array
-from dynakin.recordings.times import step_of
+from dynakin.recordings.times import span, step_of
 
 Flags = npt.NDArray[np.bool_]
 
@@ -193,7 +193,7 @@ def _dead(time: Array, plate: GroundPlate, feet: Sequence[str], contacts: Contac
                 return warning(
                     "plates",
                     f"{plate.name} reads nothing although the {feet[k]} foot stands on it from "
-                    f"{time[first]:.2f} to {time[end - 1]:.2f} s. Look whether its channels were connected, and leave "
+                    f"{span(time, first, end)}. Look whether its channels were connected, and leave "
                     "it out of the file if not.",
                 )
     return None

@@ -14,6 +14,7 @@ from dynakin.recordings.feet.contact import FootContact
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array
+from dynakin.recordings.times import span, spans
 
 Flags = npt.NDArray[np.bool_]
 
@@ -48,10 +49,6 @@ class WhoStandsWhere:
         shared = [text for p in every for text in self._shared(p)]
         return [*self._off(), *shared, *(text for p in every for text in self._lost(p))]
 
-    def _spans(self, flags: Flags) -> str:
-        time = self.time
-        return ", ".join(f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(flags))
-
     def _belt(self) -> list[Message]:
         found = []
         for name, foot in self.contacts.items():
@@ -70,17 +67,15 @@ class WhoStandsWhere:
         time, found, out = self.time, list[Message](), "what it carries is estimated there."
         for k, foot in enumerate(self.feet):
             found += [
-                note(
-                    "plates", f"The {foot} foot stands off the plates from {time[a]:.2f} to {time[b - 1]:.2f} s: {out}"
-                )
+                note("plates", f"The {foot} foot stands off the plates from {span(time, a, b)}: {out}")
                 for a, b in runs(self.off[:, k])
             ]
             if self.hidden[:, k].any():
                 found.append(
                     note(
                         "plates",
-                        f"Nobody sees where the {foot} foot is from {self._spans(self.hidden[:, k])}: it may stand off "
-                        f"the plates, so {out}",
+                        f"Nobody sees where the {foot} foot is from {spans(time, runs(self.hidden[:, k]))}: it may "
+                        f"stand off the plates, so {out}",
                     )
                 )
         return found
@@ -93,7 +88,10 @@ class WhoStandsWhere:
             if owners[:, k].any():
                 how = "given" if plate.name in self.fixed else "by its centre of pressure"
                 found.append(
-                    note("plates", f"{plate.name} carries the {foot} foot ({how}): {self._spans(owners[:, k])}.")
+                    note(
+                        "plates",
+                        f"{plate.name} carries the {foot} foot ({how}): {spans(self.time, runs(owners[:, k]))}.",
+                    )
                 )
         return found
 
@@ -102,8 +100,8 @@ class WhoStandsWhere:
         if not both.any():
             return []
         text = (
-            f"Both feet stand on {self.plates[p].name} in {np.count_nonzero(both)} frames, {self._spans(both)}: how "
-            "they divide its load is assumed."
+            f"Both feet stand on {self.plates[p].name} in {np.count_nonzero(both)} frames, "
+            f"{spans(self.time, runs(both))}: how they divide its load is assumed."
         )
         return [note("plates", text)]
 
@@ -112,7 +110,7 @@ class WhoStandsWhere:
         found = [
             note(
                 "plates",
-                f"{plate.name} is not measured or at the end of its range {_span(time, a, b)}: "
+                f"{plate.name} is not measured or at the end of its range {_when(time, a, b)}: "
                 "what it carries is estimated there.",
             )
             for a, b in runs(~plate.known)
@@ -123,15 +121,15 @@ class WhoStandsWhere:
                 warning(
                     "plates",
                     f"{plate.name} carries up to {np.nanmax(plate.wrench[a:b, 1]):.0f} N where no foot stands, "
-                    f"from {time[a]:.2f} to {time[b - 1]:.2f} s: the total wrench is left out there.",
+                    f"from {span(time, a, b)}: the total wrench is left out there.",
                 )
                 for a, b in runs(alone)
             ]
         return found
 
 
-def _span(time: Array, first: int, end: int) -> str:
+def _when(time: Array, first: int, end: int) -> str:
     """When frames [first, end) are."""
     if end - first == 1:
         return f"at {time[first]:.3f} s (one frame)"
-    return f"from {time[first]:.2f} to {time[end - 1]:.2f} s"
+    return f"from {span(time, first, end)}"

@@ -11,11 +11,11 @@ import numpy as np
 
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
+from dynakin.recordings.formats.c3d_beside import first_frame, read_analog, read_events, read_subject
+from dynakin.recordings.formats.c3d_checks import check_c3d_file
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plates import read_plates
-from dynakin.recordings.formats.c3d_records import Correction, check_c3d_file
-from dynakin.recordings.formats.c3d_signals import first_frame, read_analog, read_events
-from dynakin.recordings.formats.c3d_subject import read_subject
+from dynakin.recordings.formats.c3d_records import Correction
 from dynakin.recordings.formats.points import Points, sort_points
 from dynakin.recordings.formats.textfile import check_unique, trial_name
 from dynakin.recordings.formats.trajectories import clean_markers, distinct_names, length_unit

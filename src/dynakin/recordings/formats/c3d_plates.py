@@ -16,10 +16,9 @@ import numpy as np
 
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
+from dynakin.recordings.formats.c3d_channels import at_end_of_range, zero_frames, zeroed
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plate_types import TYPES, plate_wrench
-from dynakin.recordings.formats.c3d_range import at_end_of_range
-from dynakin.recordings.formats.c3d_zero import zero_frames, zeroed
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words

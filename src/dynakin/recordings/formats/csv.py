@@ -34,10 +34,10 @@ from dynakin.recordings.formats.textfile import (
     timed_rows,
     trial_name,
 )
-from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.formats.trajectories import clean_markers, length_unit, timing_notes
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.resampling import ReadOptions
+from dynakin.recordings.times import settled_times
 
 _TIME = re.compile(r"^time\W*(s|sec|seconds)?\W*$", re.IGNORECASE)
 _COORDINATE = re.compile(r"^(.+?)[_.: -]([xyz])$", re.IGNORECASE)

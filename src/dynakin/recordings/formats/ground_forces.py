@@ -11,14 +11,13 @@ from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, other_unit, parse_column
 from dynakin.recordings.formats.mot import Table
-from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.limits import check_wrench
-from dynakin.recordings.plates.pressure import LOADED_N, UNLOADED_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import LOADED_N, UNLOADED_N, Surface, main_axis, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.resampling import ReadOptions, low_pass, reach_s, resample, same_times, touched
-from dynakin.recordings.times import rate_of, step_of
+from dynakin.recordings.times import rate_of, settled_times, step_of
 
 Flags = npt.NDArray[np.bool_]
 
@@ -69,8 +68,8 @@ def plates_from_table(table: Table) -> tuple[tuple[Plate, ...], tuple[Message, .
 def _one_sign(plates: list[Plate]) -> tuple[list[Plate], list[Message]]:
     """The plates with those turned that pull while others push, along the axis that carries the most; all of them the
     same way is left to the check, which knows what is up."""
-    sizes = np.sum([np.abs(np.nan_to_num(plate.force)).sum(axis=0) for plate in plates], axis=0)
-    turned = pulling([plate.force[:, int(np.argmax(sizes))] for plate in plates])
+    along = main_axis(plates)
+    turned = pulling([plate.force[:, along] for plate in plates])
     if turned.all():
         return plates, []
     found = [
@@ -180,8 +179,7 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
 def _frozen(plate: Plate, time: Array) -> Flags:
     """(N,) rows of a plate that repeat the one before, while it is loaded along the axis that carries the most."""
     rows = np.hstack([plate.force, plate.moment])
-    along = int(np.argmax(np.abs(np.nan_to_num(plate.force)).sum(axis=0)))
-    return frozen(rows, plate.force[:, along], rate_of(time) if len(time) > 1 else 1.0)
+    return frozen(rows, plate.force[:, main_axis([plate])], rate_of(time) if len(time) > 1 else 1.0)
 
 
 def _covered(recording: Recording, table: Table) -> Flags:

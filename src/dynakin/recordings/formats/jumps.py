@@ -10,6 +10,7 @@ import numpy.typing as npt
 from dynakin.arrays import by_neighbours, runs
 from dynakin.messages import Message, warning
 from dynakin.recordings.recording import Array
+from dynakin.recordings.times import span, spans
 
 _SHAPE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0
 """What one step too many leaves of five steps once each is compared with the cubic through its neighbours."""
@@ -158,7 +159,7 @@ def middle(values: Array) -> Array:
     return np.where(n[:, None] > 0, 0.5 * (picked[0] + picked[1]), 0.0)
 
 
-def _exchanged(markers: Array, found: list[Jump]) -> dict[tuple[int, int], npt.NDArray[np.intp]]:
+def _exchanged(markers: Array, found: list[Jump]) -> dict[tuple[int, int], npt.NDArray[np.bool_]]:
     """Pairs of markers that jump onto each other's place in one frame, and the frames in which they bear each other's
     labels: those that are not as at the start, unless nearly all are."""
     at: dict[tuple[int, int], set[int]] = {}
@@ -171,7 +172,7 @@ def _exchanged(markers: Array, found: list[Jump]) -> dict[tuple[int, int], npt.N
         other_way = np.zeros(len(markers), dtype=bool)
         for frame in sorted(frames):
             other_way[frame:] ^= True
-        pairs[pair] = np.flatnonzero(other_way if other_way.mean() <= _MOSTLY else ~other_way)
+        pairs[pair] = other_way if other_way.mean() <= _MOSTLY else ~other_way
     return pairs
 
 
@@ -260,12 +261,14 @@ def is_back(by_m: Array, later_m: Array) -> bool:
 def _in_words(
     names: tuple[str, ...],
     time: Array,
-    exchanged: dict[tuple[int, int], npt.NDArray[np.intp]],
+    exchanged: dict[tuple[int, int], npt.NDArray[np.bool_]],
     stretches: list[_Stretch],
 ) -> list[Message]:
     said = []
     if exchanged:
-        pairs = [f"{names[a]} and {names[b]} {_when(time, frames)}" for (a, b), frames in exchanged.items()]
+        pairs = [
+            f"{names[a]} and {names[b]} from {spans(time, runs(frames), _MOST)}" for (a, b), frames in exchanged.items()
+        ]
         said.append(
             warning(
                 "labels",
@@ -275,7 +278,7 @@ def _in_words(
         )
     for kind, do in (("", "correct the labels, or delete what is no marker"), (_FOR_GOOD, _AS_TWO)):
         who = [
-            f"{names[off.marker]} by {1000.0 * off.by_m:.0f} mm from {time[off.first]:.2f} to {time[off.end - 1]:.2f} s"
+            f"{names[off.marker]} by {1000.0 * off.by_m:.0f} mm from {span(time, off.first, off.end)}"
             for off in stretches
             if (off.end == len(time)) is bool(kind)
         ]
@@ -288,13 +291,6 @@ def _in_words(
                 )
             )
     return said
-
-
-def _when(time: Array, frames: npt.NDArray[np.intp]) -> str:
-    flags = np.zeros(len(time), dtype=bool)
-    flags[frames] = True
-    spans = [f"{time[first]:.2f} to {time[end - 1]:.2f} s" for first, end in runs(flags)]
-    return f"from {', '.join(spans[:_MOST])}{' and later' if len(spans) > _MOST else ''}"
 
 
 def _listed(items: list[str]) -> str:

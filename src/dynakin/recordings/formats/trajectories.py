@@ -150,53 +150,14 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
     notes: list[Message] = []
     origin = (markers == 0.0).all(axis=2)
     if origin.any():
-        who = ", ".join(name for name, hit in zip(names, origin.any(axis=0), strict=True) if hit)
-        notes.append(
-            note("recording", f"Markers at exactly 0, 0, 0 taken as missing ({int(origin.sum())} samples: {who}).")
-        )
+        who = f"{np.count_nonzero(origin)} samples: {_whose(names, origin)}"
+        notes.append(note("recording", f"Markers at exactly 0, 0, 0 taken as missing ({who})."))
     markers, said = _without_placeholders(names, markers)
     notes += said
-    partial = np.isnan(markers).any(axis=2)
-    markers[origin | partial] = np.nan
+    markers[origin | np.isnan(markers).any(axis=2)] = np.nan
     rate = rate_of(time)
-    again, lines, stays = repeated(markers, rate), straight(markers, rate), held(markers, rate)
-    if again.any():
-        first = int(np.flatnonzero(again)[0])
-        text = (
-            f"frames repeat the one before to the last digit while the person moves: {np.count_nonzero(again)} of "
-            f"{len(markers)}, the first is frame {first + 1} ({time[first]:.3f} s)"
-        )
-        if again.mean() > _MOST_REPEATED:
-            raise RecordingError(
-                f"{path}: {text}; expected each frame once, at the rate of the cameras "
-                f"({rate * (1 - again.mean()):.0f} Hz?): export it so"
-            )
-        notes.append(
-            warning("recording", f"{text}. They are taken as missing; export the recording without filled frames.")
-        )
-        markers[again] = np.nan
-    if lines.any():
-        who = ", ".join(name for name, hit in zip(names, np.asarray(lines.any(axis=0)), strict=True) if hit)
-        notes.append(
-            warning(
-                "recording",
-                f"gaps were filled by straight lines: {who}. They are taken as missing ({np.count_nonzero(lines)} "
-                "samples).",
-            )
-        )
-        markers[lines] = np.nan
-    if (stays := stays & ~again[:, None]).any():
-        who = ", ".join(name for name, hit in zip(names, np.asarray(stays.any(axis=0)), strict=True) if hit)
-        first = int(np.flatnonzero(stays.any(axis=1))[0])
-        notes.append(
-            warning(
-                "recording",
-                f"gaps were filled by the last place before them, to the last digit: {who}, first at "
-                f"{time[first]:.3f} s. They are taken as missing ({np.count_nonzero(stays)} samples); export the "
-                "recording without filled gaps.",
-            )
-        )
-        markers[stays] = np.nan
+    markers, said = _without_filled(names, markers, time, rate, path)
+    notes += said
     notes += _left_out(markers, time)
     markers, said = without_jumps(names, markers, time, rate)
     notes += said
@@ -214,6 +175,46 @@ def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Pat
             note("recording", f"{len(empty)} frames have no marker at all, the first is frame {empty[0] + 1}.")
         )
     return markers, notes
+
+
+def _whose(names: tuple[str, ...], samples: npt.NDArray[np.bool_]) -> str:
+    """Markers of which there are some of these samples (T, M)."""
+    return ", ".join(names[m] for m in np.flatnonzero(samples.any(axis=0)))
+
+
+def _without_filled(
+    names: tuple[str, ...], markers: Array, time: Array, rate: float, path: Path
+) -> tuple[Array, list[Message]]:
+    """Without what a system filled in instead of measuring it.
+
+    Raises:
+        RecordingError: so many frames repeat others that the rate is another.
+    """
+    again, lines, stays = repeated(markers, rate), straight(markers, rate), held(markers, rate)
+    notes: list[Message] = []
+    if again.any():
+        first = int(np.argmax(again))
+        text = (
+            f"frames repeat the one before to the last digit while the person moves: {np.count_nonzero(again)} of "
+            f"{len(markers)}, the first is frame {first + 1} ({time[first]:.3f} s)"
+        )
+        if again.mean() > _MOST_REPEATED:
+            raise RecordingError(
+                f"{path}: {text}; expected each frame once, at the rate of the cameras "
+                f"({rate * (1 - again.mean()):.0f} Hz?): export it so"
+            )
+        text += ". They are taken as missing; export the recording without filled frames."
+        notes.append(warning("recording", text))
+    stays &= ~again[:, None]
+    for filled, how in ((lines, "by straight lines"), (stays, "by the last place before them, to the last digit")):
+        if filled.any():
+            first = int(np.argmax(filled.any(axis=1)))
+            text = (
+                f"gaps were filled {how}: {_whose(names, filled)}, first at {time[first]:.3f} s. They are taken as "
+                f"missing ({np.count_nonzero(filled)} samples); export the recording without filled gaps."
+            )
+            notes.append(warning("recording", text))
+    return np.where((again[:, None] | lines | stays)[:, :, None], np.nan, markers), notes
 
 
 def _without_placeholders(names: tuple[str, ...], markers: Array) -> tuple[Array, list[Message]]:
@@ -238,9 +239,11 @@ def _without_placeholders(names: tuple[str, ...], markers: Array) -> tuple[Array
     if not hit.any():
         return markers, []
     found = hit.reshape(markers.shape[:2])
-    who = ", ".join(name for name, own in zip(names, np.asarray(found.any(axis=0)), strict=True) if own)
     where = ", ".join(f"{value:.6g}" for value in flat[np.argmax(hit)])
-    text = f"Markers at exactly {where} m, far outside the volume, taken as missing ({int(hit.sum())} samples: {who})."
+    text = (
+        f"Markers at exactly {where} m, far outside the volume, taken as missing ({int(hit.sum())} samples: "
+        f"{_whose(names, found)})."
+    )
     return np.where(found[:, :, None], np.nan, markers), [note("recording", text)]
 
 

@@ -22,10 +22,10 @@ from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
 from dynakin.recordings.formats.points import sort_points
 from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows, trial_name
-from dynakin.recordings.formats.time_stamps import settled_times
 from dynakin.recordings.formats.trajectories import clean_markers, distinct_names, length_unit, timing_notes
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
+from dynakin.recordings.times import settled_times
 
 _AXES_ROW = re.compile(r"^[XYZ]_?\d*$", re.IGNORECASE)
 

@@ -3,6 +3,7 @@ thing."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,11 @@ class Surface:
 
     point: Array
     normal: Array
+
+
+def main_axis(plates: Iterable[Plate]) -> int:
+    """Axis of the laboratory along which plates carry the most: the vertical one, where nobody says which that is."""
+    return int(np.argmax(np.sum([np.abs(np.nan_to_num(plate.force)).sum(axis=0) for plate in plates], axis=0)))
 
 
 def centre_of_pressure(force: Array, moment: Array, surface: Surface, threshold_n: float) -> tuple[Array, Array]:

@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.messages import Message, warning
-from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, main_axis
 from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.times import spans
 
 Flags = npt.NDArray[np.bool_]
 
@@ -36,6 +37,9 @@ PRESS_S, CHANGES = 0.2, 0.2
 forces and the centre of pressure: what stands still then is no person."""
 STILL_N, STILL_M = 1e-5, 1e-4
 """Part of the largest vertical force, and m, within which a channel is constant: noise alone is 0.1 N and 0.2 mm."""
+
+
+MOST = 3  # spans that a message lists
 
 
 def frozen(rows: Array, push: Array, rate_hz: float, least: tuple[int, float] = (FROZEN, FROZEN_S)) -> Flags:
@@ -77,7 +81,7 @@ def frozen_in_words(name: str, time: Array, lost: Flags) -> list[Message]:
     return [
         warning(
             "plates",
-            f"{name} repeats one and the same row while somebody stands on it, from {_when(time, runs(lost))}, "
+            f"{name} repeats one and the same row while somebody stands on it, from {spans(time, runs(lost), MOST)}, "
             "though its load moved before or jumps after: not measured there. Export the forces again, or look whether "
             "their recording was interrupted.",
         )
@@ -91,12 +95,6 @@ def frozen_live_in_words(name: str, since_s: float) -> Message:
         f"{name} repeats one and the same row while somebody stands on it, from {since_s:.2f} s on, though its load "
         "moved before: it is not measured as long as it does. Look whether its amplifier or its connection hangs.",
     )
-
-
-def _when(time: Array, spans: Sequence[tuple[int, int]]) -> str:
-    """When frames [first, end) of these stretches are, the first three of them."""
-    more = f" and {len(spans) - 3} more times" if len(spans) > 3 else ""
-    return ", ".join(f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in spans[:3]) + more
 
 
 @dataclass(frozen=True)
@@ -116,8 +114,7 @@ def without_dead_channels(recording: Recording) -> Recording:
     plate."""
     if not recording.plates or recording.n_frames < 2:
         return recording
-    total = np.nansum([np.abs(np.nan_to_num(plate.force)).sum(axis=0) for plate in recording.plates], axis=0)
-    up = int(np.argmax(total))
+    up = main_axis(recording.plates)
     level = [axis for axis in range(3) if axis != up]
     presses = [press for p, plate in enumerate(recording.plates) for press in _presses(plate, p, up, level, recording)]
     if not presses:
@@ -131,9 +128,9 @@ def without_dead_channels(recording: Recording) -> Recording:
         own = [k for k, press in enumerate(presses) if press.plate == p and (dead_force[k].any() or dead_cop[k].any())]
         if not own:
             continue
-        spans = [(presses[k].first, presses[k].end) for k in own]
-        notes.append(_dead_in_words(recording, plate.name, spans, level, dead_force[own], dead_cop[own]))
-        plates[p] = _without(plate, spans, up)
+        dead = [(presses[k].first, presses[k].end) for k in own]
+        notes.append(_dead_in_words(recording, plate.name, dead, level, dead_force[own], dead_cop[own]))
+        plates[p] = _without(plate, dead, up)
     return recording.with_plates(tuple(plates), tuple(notes)) if notes else recording
 
 
@@ -174,7 +171,7 @@ def _presses(plate: Plate, p: int, up: int, level: Sequence[int], recording: Rec
 
 
 def _dead_in_words(
-    recording: Recording, name: str, spans: list[tuple[int, int]], level: Sequence[int], force: Flags, cop: Flags
+    recording: Recording, name: str, dead: list[tuple[int, int]], level: Sequence[int], force: Flags, cop: Flags
 ) -> Message:
     what = [f"its F{'xyz'[axis]}" for k, axis in enumerate(level) if force[:, k].any()]
     if cop.any():
@@ -183,17 +180,17 @@ def _dead_in_words(
     return warning(
         "plates",
         f"{name}: {' and '.join(what)} never change{'s' if len(what) == 1 else ''} while the load on it does, from "
-        f"{_when(recording.time, spans)}: a channel is dead or was not exported. Not measured there; look "
+        f"{spans(recording.time, dead, MOST)}: a channel is dead or was not exported. Not measured there; look "
         f"at its channels in {recording.plates_file}.",
     )
 
 
-def _without(plate: Plate, spans: list[tuple[int, int]], up: int) -> Plate:
+def _without(plate: Plate, dead: list[tuple[int, int]], up: int) -> Plate:
     """The plate without these presses, from where it is loaded at all to where it is left."""
     lost = np.zeros(len(plate.force), dtype=bool)
     for first, end in runs(np.abs(np.nan_to_num(plate.force[:, up])) > UNLOADED_N):
-        lost[first:end] = any(first <= a < end for a, _ in spans)
-    for first, end in spans:
+        lost[first:end] = any(first <= a < end for a, _ in dead)
+    for first, end in dead:
         lost[first:end] = True
     return without_frames(plate, lost)
 

@@ -1,17 +1,18 @@
-"""What was recorded: names, gaps, frames that were filled, what was left out."""
+"""What was recorded, and the run: gaps, what was left out or not made, what is locked, how long a step took."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from dynakin.arrays import runs
-from dynakin.recordings.times import step_of
+from dynakin.recordings.times import span, step_of
 from dynakin.report.findings.finding import Insight, Level, Metrics
 from dynakin.report.labels import short_marker_names
 from dynakin.results.estimate import Estimate
+from dynakin.results.failures import LOG
 from dynakin.results.measures.soft_tissue import marker_sites
 from dynakin.results.measures.sources import out_of_sight
-from dynakin.results.naming import listed, words
+from dynakin.results.naming import listed, number, sentence, words
 from dynakin.results.records import REFUSED
 
 # A sensor that is refused for less than this, s, is a note.
@@ -46,7 +47,7 @@ def _unseen(estimate: Estimate) -> dict[str, str]:
     segments, time = estimate.marker_segments, estimate.time
     owners = [segments.get(site, "") for _, site in marker_sites(estimate)]
     hidden = out_of_sight(np.isfinite(estimate.values("markers_measured")).any(axis=2), owners, time)
-    spans = {name: [f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(own)] for name, own in hidden.items()}
+    spans = {name: [span(time, a, b) for a, b in runs(own)] for name, own in hidden.items()}
     return {name: listed(own, 3) for name, own in spans.items() if own}
 
 
@@ -68,3 +69,35 @@ def _briefly(estimate: Estimate) -> bool:
     frame_s = step_of(estimate.time)
     refused = (estimate.values("verdict") == REFUSED).sum(axis=0)
     return bool(refused.max() * frame_s < BRIEF_S)
+
+
+def failed(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Stages that failed after the estimate."""
+    said = [message.text for message in estimate.messages if message.level == "failure"]
+    if not said:
+        return None
+    return Insight("warning", "Not made", " ".join(said), f"{LOG} has the details; please report them.")
+
+
+def locked(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Coordinates that are held still."""
+    free = {str(name) for name in estimate.data["element"].values}
+    held = [words(name) for name in estimate.coordinate_names if name not in free]
+    if not held:
+        return None
+    verb = "is" if len(held) == 1 else "are"
+    return Insight("note", "Locked", f"{sentence(listed(held))} {verb} held still; the notes below say why.")
+
+
+def step_time(estimate: Estimate, metrics: Metrics) -> Insight:
+    """How long a step took."""
+    timing = estimate.timing
+    factor, unit = (1e-3, "ms") if timing.median_us >= 1000.0 else (1.0, "µs")
+    times = number(timing.realtime_factor, digits=2)
+    speed = f"{times} times faster than" if timing.realtime_factor >= 1.0 else f"only {times} times as fast as"
+    return Insight(
+        "note",
+        "Time of a step",
+        f"A step took {number(factor * timing.median_us, unit)} (median; 99 of 100 within "
+        f"{number(factor * timing.p99_us, unit)}), {speed} the recording went.",
+    )

@@ -16,8 +16,7 @@ from matplotlib.patches import Patch
 from dynakin.report.body import chain_of, painted
 from dynakin.report.chart import band_is_too_wide
 from dynakin.report.figure import draw_sourced
-from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note
-from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
+from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.sections.repetitions import (
     KINDS,
     ONE_SD,
@@ -30,7 +29,7 @@ from dynakin.report.sections.repetitions import (
     plots_by_method,
 )
 from dynakin.report.sides import joints_of, side_lines
-from dynakin.report.styles import BAND, LineStyle, method_styles, source_key
+from dynakin.report.styles import BAND, ESTIMATED, INK, MEASURED, QUIET, LineStyle, method_styles, source_key
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.mean_curves import PERCENT, estimate_curves
@@ -78,7 +77,7 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
     axes.set_xlim(span)
     axes.set_ylim(floor - 0.42, float(np.nanmax(shown[:, :, 1])) + 0.08)
     axes.axis("off")
-    whose = "segment" if is_planar(estimate) else "side"
+    whose = "segment" if estimate.planar else "side"
     axes.set_title(f"Markers over one cycle: measured (hollow) and estimated (filled, in the {whose}’s colour)")
     letters = sum(len(name) + 4 for name in key)
     at, step = span[0] + 1.0, (span[1] - span[0] - 1.0) / max(letters, 60)
@@ -94,7 +93,7 @@ def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
     joints = [joint for joint in joints_of(estimate) if np.any(sd[:, list(joint.columns.values())])]
     if not joints:
         return None
-    styles, alone = side_lines(estimate), is_planar(estimate)
+    styles, alone = side_lines(estimate), estimate.planar
     classical = _reference(comparison, CLASSICAL) if alone else None
     differences = {row.coordinate: row for row in angle_differences([] if comparison is None else [comparison])}
     columns = min(4, len(joints))

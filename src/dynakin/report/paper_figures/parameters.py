@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from dynakin.report.body import colours_of
 from dynakin.report.labels import signed_percent
-from dynakin.report.plot import LIMIT, QUIET, thin
+from dynakin.report.styles import LIMIT, QUIET, thin
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import number, shown_unit, words
 from dynakin.results.records import Parameter

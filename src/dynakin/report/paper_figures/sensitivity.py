@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dynakin.errors import ConfigError
-from dynakin.report.plot import INK, QUIET
+from dynakin.report.styles import INK, QUIET
 from dynakin.results.files.netcdf import ONE_AT_A_TIME
 from dynakin.results.naming import number
 

@@ -12,9 +12,8 @@ from dynakin.elements import element
 from dynakin.report.bars import Bar, share_bars
 from dynakin.report.chart import Bound, Line, Panel, chart
 from dynakin.report.labels import parameter_label, short_marker_names, signed_percent
-from dynakin.report.plot import ESTIMATED
 from dynakin.report.sections.section import Page, Section
-from dynakin.report.styles import BAND, BOUND_LINE, ESTIMATED_LINE
+from dynakin.report.styles import BAND, BOUND_LINE, ESTIMATED, ESTIMATED_LINE
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.posterior import JUDGEMENT_WORDS, KNOWN, NOTHING, group_of, posterior_in_words

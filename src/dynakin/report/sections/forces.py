@@ -9,10 +9,9 @@ import numpy as np
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.report.chart import Line, chart
 from dynakin.report.labels import COMPONENT_LABELS
-from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import side_key
-from dynakin.report.styles import BAND, ESTIMATED_LINE, MEASURED_LINE, SIDE_COLOURS, source_key
+from dynakin.report.styles import BAND, ESTIMATED, ESTIMATED_LINE, MEASURED, MEASURED_LINE, SIDE_COLOURS, source_key
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.measures.feet import foot_sources

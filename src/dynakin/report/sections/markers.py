@@ -9,10 +9,9 @@ import numpy as np
 from dynakin.report.bars import Bar, value_bars
 from dynakin.report.chart import Line, Panel, chart
 from dynakin.report.labels import short_marker_names
-from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
 from dynakin.report.sections.forces import DIRECTIONS
 from dynakin.report.sections.section import Page, Section
-from dynakin.report.styles import ESTIMATED_LINE, MEASURED_LINE, LineStyle
+from dynakin.report.styles import ESTIMATED, ESTIMATED_LINE, INK, MEASURED, MEASURED_LINE, QUIET, LineStyle
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES
 from dynakin.results.naming import number, words

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from dynakin.report.chart import Panel
-from dynakin.report.labels import is_planar
 from dynakin.report.styles import LineStyle
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
@@ -35,7 +34,7 @@ class Page:
     @cached_property
     def planar(self) -> bool:
         """Whether the model explains the markers in one plane only."""
-        return is_planar(self.estimate)
+        return self.estimate.planar
 
     @cached_property
     def repetitions(self) -> Found:

@@ -35,7 +35,7 @@ def facing(estimate: Estimate) -> Estimate:
     """
     ground = estimate.ground.facing()
     turn = ground.rotation @ estimate.ground.rotation.T  # R_FG
-    if not estimate.modelled_axes().all() or np.allclose(turn, np.eye(3), atol=1e-12):
+    if estimate.planar or np.allclose(turn, np.eye(3), atol=1e-12):
         return estimate
     found = {}
     for name, variable in estimate.data.data_vars.items():

@@ -110,8 +110,11 @@ BRIDGED_S = 0.05
 
 
 def refused_for_long(data: xr.Dataset) -> npt.NDArray[np.bool_]:
-    """(T,) frames whose plates were refused, without such stretches of `BRIDGED_S` at most between others."""
+    """(T,) frames whose plates were refused, without such stretches of `BRIDGED_S` at most between others; all of them
+    of a model that stands on its root, behind whose joints nothing but the plates is."""
     time, refused = np.asarray(data["time"].values), plates_refused(data)
+    if "foot_contact" not in data:
+        return refused
     for first, end in runs(refused):
         if first > 0 and end < len(time) and time[end] - time[first] <= BRIDGED_S + 1e-9:
             refused[first:end] = False

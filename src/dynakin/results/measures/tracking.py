@@ -11,6 +11,7 @@ import numpy.typing as npt
 from dynakin.arrays import rms, runs
 from dynakin.errors import LostError
 from dynakin.messages import warning
+from dynakin.recordings.times import spans
 from dynakin.results.estimate import AXES, Estimate, values_of
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
 from dynakin.results.measures.sources import ABSENT
@@ -95,7 +96,8 @@ def in_words(estimate: Estimate, found: Tracking) -> str:
     time = estimate.time
     astray = found.lost & found.measured
     parts = [
-        f"{int(found.lost.sum())} of {len(time)} frames are no estimate and left empty ({times(time, found.lost)})"
+        f"{int(found.lost.sum())} of {len(time)} frames are no estimate and left empty "
+        f"({spans(time, runs(found.lost), 4)})"
     ]
     if astray.any():
         far = found.distance_m[astray]
@@ -122,13 +124,6 @@ def lost_in_words(estimate: Estimate) -> str:
     """`in_words` of an estimate; empty where nobody was lost."""
     found = estimate.tracking
     return in_words(estimate, found) if found is not None and found.lost.any() else ""
-
-
-def times(time: Array, flags: Mask, limit: int = 4) -> str:
-    """Stretches of frames as times: `0.10 to 0.55 s, 1.20 to 1.31 s and 2 more`."""
-    parts = [f"{time[first]:.2f} to {time[end - 1]:.2f} s" for first, end in runs(flags)]
-    more = f" and {len(parts) - limit} more" if len(parts) > limit else ""
-    return ", ".join(parts[:limit]) + more
 
 
 def why_lost(estimate: Estimate) -> str | None:

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from dynakin.simulation.bodies.markers import MarkerList, Row, Site
+from dynakin.simulation.bodies.markers import SCATTER_M, MarkerList, Row, Site
 from dynakin.simulation.bodies.subject import SimulatedSubject
 
 _LOWER = {"foot", "shank", "thigh"}  # the right side's names of these begin with r_, of the others with R_
@@ -159,11 +159,9 @@ SETS: Mapping[str, MarkerList] = {
 """Marker lists by the name of the marker set."""
 
 
-def draw_sites(
-    rng: np.random.Generator, subject: SimulatedSubject, markers: MarkerList, scatter_m: float = 0.006
-) -> tuple[Site, ...]:
-    """Marker sites of the subject, as `dynakin.simulation.bodies.markers.draw_sites`: each is put down ``scatter_m``
-    (standard deviation an axis) off its usual place, paired landmarks where they belong."""
+def draw_sites(rng: np.random.Generator, subject: SimulatedSubject, markers: MarkerList) -> tuple[Site, ...]:
+    """Marker sites of the subject, as `dynakin.simulation.bodies.markers.draw_sites`: each is put down off its
+    usual place (`SCATTER_M`), paired landmarks where they belong."""
     sites = []
     for row in markers.rows:
         y = row.y
@@ -171,11 +169,11 @@ def draw_sites(
             y = y / _SPREAD[row.part] * subject.lengths[row.part] / subject.height_m
         place = subject.height_m * np.array([row.x, y, row.lateral])
         if row.lateral == 0.0 and row.part not in PAIRED:
-            off = scatter_m * rng.standard_normal(3)
+            off = SCATTER_M * rng.standard_normal(3)
             sites.append(Site(row.stem, row.part, row.region, place + off, row.landmark, _driver(row, "_r")))
             continue
         for side, sign in (("right", 1.0), ("left", -1.0)):
-            off = np.zeros(3) if row.landmark else scatter_m * rng.standard_normal(3)
+            off = np.zeros(3) if row.landmark else SCATTER_M * rng.standard_normal(3)
             name, suffix = markers.name(row, side), f"_{side[0]}"
             segment = row.part + suffix if row.part in PAIRED else row.part
             place_of = place * [1.0, 1.0, sign] + off

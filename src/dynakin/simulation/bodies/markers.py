@@ -54,6 +54,8 @@ class MarkerList:
 
 
 # The length along which a part's markers are spread, and its part of the height on which the rows rest.
+SCATTER_M = 0.006
+"""Standard deviation, an axis, by which a marker is put down off its usual place."""
 _LENGTH_OF = {
     "shank": ("shank", 0.246),
     "thigh": ("thigh", 0.245),
@@ -68,13 +70,11 @@ def draw_sites(
     rng: np.random.Generator,
     subject: SimulatedSubject,
     markers: MarkerList,
-    scatter_m: float = 0.006,
     *,
     attach: Mapping[str, tuple[str, Array]] | None = None,
     drivers: Mapping[str, str] | None = None,
 ) -> tuple[Site, ...]:
-    """Marker sites of the subject; each is put down ``scatter_m`` (standard deviation an axis) off its usual
-    place.
+    """Marker sites of the subject; each is put down off its usual place (`SCATTER_M`).
 
     Paired landmarks stay where they belong: what their misplacement does is a sensor error of its own
     (`misplace`), not part of the subject.
@@ -94,11 +94,11 @@ def draw_sites(
             y = y / fraction * subject.lengths[length] / subject.height_m
         place = subject.height_m * np.array([row.x, y, row.lateral]) + shift
         if row.lateral == 0.0:
-            off = scatter_m * rng.standard_normal(3)
+            off = SCATTER_M * rng.standard_normal(3)
             sites.append(Site(row.stem, segment, row.region, place + off, row.landmark, driver))
             continue
         for side, sign in (("right", 1.0), ("left", -1.0)):
-            off = np.zeros(3) if row.landmark else scatter_m * rng.standard_normal(3)
+            off = np.zeros(3) if row.landmark else SCATTER_M * rng.standard_normal(3)
             name = markers.name(row, side)
             sites.append(Site(name, segment, row.region, place * [1.0, 1.0, sign] + off, row.landmark, driver))
     return tuple(sites)

@@ -13,9 +13,8 @@ from dynakin.files import is_file
 from dynakin.settings.strict import nearest
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.mechanics import Motion
-from dynakin.simulation.motions.belt import belt_movement
 from dynakin.simulation.motions.drop_jump import drop_jump
-from dynakin.simulation.motions.gait import gait_movement
+from dynakin.simulation.motions.gait import belt_movement, gait_movement
 from dynakin.simulation.motions.motion_file import file_movement
 from dynakin.simulation.motions.movement import Movement
 from dynakin.simulation.motions.sit_in_space import sit_in_space

@@ -144,4 +144,4 @@ def load_sensors(name_or_path: str) -> SensorNoise:
     try:
         return SensorNoise().changed(values)
     except ConfigError as error:
-        raise ConfigError(f"{path}: {error.message}") from None
+        raise error.reworded(f"{path}: {error.message}") from None

@@ -94,7 +94,7 @@ def check_presets(names: Sequence[str], where: str) -> None:
         try:
             preset(name)
         except ConfigError as error:
-            raise ConfigError(f"{where}: {error.message}") from None
+            raise error.reworded(f"{where}: {error.message}") from None
 
 
 def _run_keys(content: dict[str, Any], own: tuple[str, ...], where: str) -> dict[str, Any]:

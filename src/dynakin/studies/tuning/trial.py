@@ -83,9 +83,7 @@ class TuningTrial:
         }
 
 
-def prepare(
-    recording: Recording, estimator: Estimator, *, static: Recording | None = None, horizon_s: float = HORIZON_S
-) -> TuningTrial:
+def prepare(recording: Recording, estimator: Estimator, *, static: Recording | None = None) -> TuningTrial:
     """Read everything off a recording that does not depend on the settings to be tried.
 
     The estimator's own settings start: plates that lag are brought into step, and what its gates refuse is taken out
@@ -116,7 +114,7 @@ def prepare(
         np.ascontiguousarray(wrench),
         int(window[0]),
         len(recording.time),
-        max(1, round(horizon_s / step)),
+        max(1, round(HORIZON_S / step)),
         estimator.estimate,
     )
 

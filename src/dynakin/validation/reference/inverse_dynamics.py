@@ -15,7 +15,8 @@ from dynakin.arrays import rms_length, wrench_about
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.inverse_kinematics import fixed_model, inverse_kinematics
-from dynakin.recordings.smoothing import MAX_GAP_S, even_step, fill_gaps, smooth
+from dynakin.recordings.smoothing import MAX_GAP_S, fill_gaps, smooth
+from dynakin.recordings.times import even_step
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import ABSENT, MEASURED
 

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from dynakin.errors import ModelError
 from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
-from dynakin.model.markers.side_words import LONG_SIDE_WORDS, SHORT_SIDE_WORDS
+from dynakin.model.markers.match import LONG_SIDE_WORDS, SHORT_SIDE_WORDS
 from dynakin.recordings.landmarks import plain_name
 from dynakin.settings.strict import read_toml
 

@@ -6,12 +6,10 @@ pelvis and trunk are together, and 5 of 230 clusters of recordings with hidden n
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter, defaultdict
 from collections.abc import Container, Mapping
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +25,7 @@ from dynakin.model.markers.draft.by_geometry import (
     segment_at,
 )
 from dynakin.model.markers.draft.by_name import Sure, places, said_together
+from dynakin.model.markers.draft.guess import Guess, contents, is_text, names_in_set, printable, rest_of
 from dynakin.model.markers.match import MarkerMatch, is_unlabelled
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.recordings.frame import UPRIGHT
@@ -51,19 +50,6 @@ leaves out (opencap's forearm) say little."""
 _RANK: dict[Sure, int] = {"sure": 0, "likely": 1, "unsure": 2}
 
 
-@dataclass(frozen=True)
-class Guess:
-    """One marker of the recording. place: of anatomy.toml; else segment: of whose cluster it is; neither: unknown.
-    side: "right", "left" or "centre"."""
-
-    recorded: str
-    place: str | None
-    segment: str | None
-    side: str
-    sure: Sure
-    why: str
-
-
 def guess_markers(recording: Recording) -> list[Guess]:
     """A guess for each marker that is seen, in the order of the recording.
 
@@ -80,7 +66,7 @@ def guess_markers(recording: Recording) -> list[Guess]:
     doubled = next((same for same in alike.values() if len(same) > 1), None)
     if doubled is not None:
         raise RecordingError(
-            f"{where}: markers {' and '.join(map(_printable, doubled))} have one name but for case, separators or what "
+            f"{where}: markers {' and '.join(map(printable, doubled))} have one name but for case, separators or what "
             "stands before a colon, expected names that differ, of one person"
         )
     stands = standing_window(recording) is not None
@@ -111,11 +97,11 @@ def drafted(recording: Recording) -> MarkerSetFile | None:
     guesses = [guess for guess in guess_markers(recording) if _RANK[guess.sure] <= _RANK["likely"]]
     if not any(guess.place for guess in guesses):
         return None
-    places_, clusters = _contents(guesses)
+    places_, clusters = contents(guesses)
     whole = {
         "schema_version": 1,
         "name": GUESSED,
-        "places": {place: _names(own) for place, own in places_.items()},
+        "places": {place: names_in_set(own) for place, own in places_.items()},
         "clusters": {segment: [entry for entry, _ in own] for segment, own in clusters.items()},
     }
     return MarkerSetFile.model_validate(expanded(whole))
@@ -149,20 +135,6 @@ def further(recording: Recording, match: MarkerMatch) -> list[Guess]:
     return found
 
 
-def names_of(guesses: list[Guess]) -> dict[str, Any]:
-    """Guesses as what a marker set's file has of ``places`` and ``clusters``, with names as they stand."""
-    places_, clusters = _contents(guesses)
-    return {
-        "places": {place: {g.side: [g.recorded] for g in own} for place, own in places_.items()},
-        "clusters": {
-            segment: [
-                {"name": f"{segment}, {own[0].recorded}", **{g.side: [g.recorded] for g in own}} for _, own in entries
-            ]
-            for segment, entries in clusters.items()
-        },
-    }
-
-
 def _standing(recording: Recording) -> tuple[list[str], Array]:
     """Names and places (M, 3) m, laboratory frame, of what a person wears, while standing or at the start."""
     bones = [name for name in recording.marker_names if _BONES.match(name)]
@@ -170,7 +142,7 @@ def _standing(recording: Recording) -> tuple[list[str], Array]:
     window = standing_window(recording)
     found: dict[str, Array] = {}
     for name in recording.marker_names:
-        if not _is_text(name):
+        if not is_text(name):
             continue  # no file can hold the name
         if (name in bones and name[:-1] in drawn) or _COMPUTED.search(plain_name(name)) or is_unlabelled(name):
             continue  # points of a model that software drew, unlabelled trajectories
@@ -305,7 +277,7 @@ def _as_on_the_other_side(guesses: list[Guess], spoken: Container[str]) -> list[
     taken = {(guess.place, guess.side) for guess in guesses}
     found = []
     for guess in guesses:
-        mates = [g for g in unsaid if g.side != guess.side and _rest(g.recorded) == _rest(guess.recorded)]
+        mates = [g for g in unsaid if g.side != guess.side and rest_of(g.recorded) == rest_of(guess.recorded)]
         if guess in unsaid and not guess.place and len(mates) == 1 and mates[0].place:
             place = mates[0].place
             if (place, guess.side) not in taken:
@@ -317,100 +289,3 @@ def _as_on_the_other_side(guesses: list[Guess], spoken: Container[str]) -> list[
 
 def _segment_of(guess: Guess) -> str:
     return str(guess.segment or anatomy()["places"].get(guess.place, {}).get("segment", ""))
-
-
-def toml_text(guesses: list[Guess], name: str, source: str) -> str:
-    """The marker set's file, with a comment on each line: how sure, and why."""
-    lines = [
-        f"# Draft of a marker set: `dynakin markers new` from {_printable(source)}. Look at what is unsure, then:",
-        "#   dynakin run TRIAL --markers THIS.toml -o OUT",
-        "# Places are those of `dynakin markers places`; {right,left} in braces, or a plain name in the middle.",
-        "schema_version = 1",
-        f"name = {_quoted(name)}",
-        'description = "draft from a recording"',
-        "",
-        "[places]",
-    ]
-    places_, clusters = _contents(guesses)
-    lines += [f"{place} = {_toml(_names(own))}  # {_comment(own)}" for place, own in places_.items()]
-    if clusters:
-        lines += ["", "# Markers that follow a segment and mark no place of it.", "[clusters]"]
-    for segment, entries in clusters.items():
-        lines += [f"{segment} = [", *(f"  {_toml(entry)},  # {_comment(pair)}" for entry, pair in entries), "]"]
-    unknown = [g for g in guesses if not g.place and g.segment not in anatomy()["clusters"]]
-    if unknown:
-        lines += ["", "# Unknown, not used:", *(f"#   {_printable(g.recorded)}: {g.why}" for g in unknown)]
-    return "\n".join(lines) + "\n"
-
-
-def _contents(
-    guesses: list[Guess],
-) -> tuple[dict[str, list[Guess]], dict[str, list[tuple[dict[str, Any], list[Guess]]]]]:
-    """Of a marker set's file: places, and by segment the entries of clusters; with the guesses behind each."""
-    own = {place: [g for g in guesses if g.place == place] for place in anatomy()["places"]}
-    clusters: dict[str, list[Guess]] = defaultdict(list)
-    for guess in guesses:
-        if not guess.place and guess.segment in anatomy()["clusters"]:
-            clusters[str(guess.segment)].append(guess)
-    entries: dict[str, list[tuple[dict[str, Any], list[Guess]]]] = {}
-    for segment, followers in clusters.items():
-        entries[segment] = []
-        for k, pair in enumerate(_pairs(followers)):
-            names = _names(pair)
-            entry = names if isinstance(names, dict) else {"names": names}
-            entries[segment].append(({"name": f"{segment}{k + 1}", **entry}, pair))
-    return {place: found for place, found in own.items() if found}, entries
-
-
-def _pairs(own: list[Guess]) -> list[list[Guess]]:
-    """Markers of a cluster, right and left together by their names' rest or, without one, by their order."""
-    sides: dict[str, list[Guess]] = {side: [g for g in own if g.side == side] for side in ("right", "left", "centre")}
-    pairs: list[list[Guess]] = []
-    left = list(sides["left"])
-    for right in sides["right"]:
-        mate = next((g for g in left if _rest(g.recorded) == _rest(right.recorded)), left[0] if left else None)
-        if mate is not None:
-            left.remove(mate)
-        pairs.append([right] if mate is None else [right, mate])
-    return [*pairs, *([g] for g in left), *([g] for g in sides["centre"])]
-
-
-def _rest(name: str) -> str:
-    return re.sub(r"right|left|^[rl]|[rl]$", "", plain_name(name))
-
-
-def _names(own: list[Guess]) -> str | dict[str, Any]:
-    """The names of a place in a marker set's file: a pattern, or by side where they have what patterns use."""
-    by_side = {g.side: g.recorded for g in own}
-    plain = not any(set(",{}") & set(name) for name in by_side.values())
-    if plain and set(by_side) == {"right", "left"}:
-        return f"{{{by_side['right']},{by_side['left']}}}"
-    if plain and set(by_side) == {"centre"}:
-        return by_side["centre"]
-    return {side: [name] for side, name in by_side.items()}
-
-
-def _toml(entry: str | list[str] | dict[str, Any]) -> str:
-    if isinstance(entry, str):
-        return _quoted(entry)
-    if isinstance(entry, list):
-        return f"[{', '.join(map(_quoted, entry))}]"
-    return "{ " + ", ".join(f"{key} = {_toml(value)}" for key, value in entry.items()) + " }"
-
-
-def _comment(own: list[Guess]) -> str:
-    parts = list(dict.fromkeys(f"{g.sure}: {_printable(g.why)}" for g in own))
-    return parts[0] if len(parts) == 1 else "; ".join(f"{g.side} {g.sure}: {_printable(g.why)}" for g in own)
-
-
-def _is_text(name: str) -> bool:
-    """Whether a name can be written (halves of a character, which programs hand over, cannot)."""
-    return not any("\ud800" <= c <= "\udfff" for c in name)
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # which JSON allows and TOML does not
-
-
-def _printable(text: str) -> str:
-    return "".join(c if c.isprintable() else "?" for c in text)
