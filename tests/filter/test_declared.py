@@ -12,8 +12,8 @@ import pytest
 import dynakin
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.closure import Closure, closure
+from dynakin.filter.plate_sum import foot_markers
 from dynakin.filter.samples import recording_arrays
-from dynakin.filter.total_wrench import foot_markers
 from dynakin.messages import notes_of, warnings_of
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.assignment import foot_loads

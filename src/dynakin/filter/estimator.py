@@ -18,10 +18,11 @@ from dynakin.filter.augment import initial_covariance
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.filter.plate_place import off_place
+from dynakin.filter.plate_sum import doubtful_mass
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.skin import following_skin, may_follow
-from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
+from dynakin.filter.total_wrench import Ground, known_ground
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel

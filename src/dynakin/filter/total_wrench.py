@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
 from dynakin.errors import RecordingError
 from dynakin.filter.carried import carried_in_hands, carried_in_words
-from dynakin.filter.closure import Closure, closure
-from dynakin.filter.declared import bearing, may_bear, plate_of_its_own
+from dynakin.filter.declared import may_bear, plate_of_its_own
 from dynakin.filter.expected import ContactPaths
 from dynakin.filter.plate_clock import Delay, clock_delay
 from dynakin.filter.plate_gain import NO_GAINS, found_gains
@@ -28,45 +25,28 @@ from dynakin.filter.plate_motion import (
     turned_axes,
     wrong_rate_in_words,
 )
-from dynakin.filter.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear, not_zeroed
+from dynakin.filter.plate_sum import foot_markers, judged_by_motion
+from dynakin.filter.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear
 from dynakin.messages import Message, about, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.checks import PlateCheck, check_plates
+from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.assignment import check_assigned, foot_loads
-from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
-from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.plates.stuck import vertical_only
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.weight import likely_unit
-from dynakin.settings.contacts import SEAT
-from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-MASS_APART = 0.05
-"""Part of the weight by which the plates' mean may differ before the mass is doubted: movement explains 2 or 3 %."""
-UNSEEN_APART = 0.15
-"""The same, more, by the part of the mass that no marker shows: a trunk that is held does not swing as it does."""
-
-UNJUDGED = (
-    "The recording is too short, or shows too few markers, to check by the motion of the centre of mass that the "
-    "plates carry the person."
-)
 CLOCK_HIDDEN = "Not all of the body is marked: this movement does not show whether plates and markers are in step."
 CLOCK_UNKNOWN = (
     "Whether plates and markers are in step within some milliseconds is not known here: it takes half a second of a "
     "movement in which the plates carry all of the person, never more than twice the weight, and no declared contact."
 )
-MANY = 0.2
-"""Part of the frames from which it is said that they could not be checked; the ends of a recording never can."""
-_NEARLY_ALL = 0.8
-"""Part of the judged frames from which an excess is said of the whole recording: its mass may be wrong."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,23 +78,6 @@ class Ground:
     off_gain: Array | None = None
     behind_s: float = 0.0
     clock_sd_s: float = 0.0
-
-
-def foot_markers(initial: CalibratedModel) -> dict[str, list[str]]:
-    """Foot -> the recording's names of the markers on its segment, and on those that hang on that (toes); none of
-    `CalibratedModel.unmarked_feet`."""
-    parents = {segment.name: segment.parent for segment in initial.spec.segments}
-
-    def on(segment: str, foot: str) -> bool:
-        return segment == foot or (segment in parents and on(parents[segment], foot))
-
-    if not initial.feet:
-        return initial.foot_markers
-    pairs = list(zip(initial.recorded_markers, initial.spec.markers, strict=True))
-    return {
-        side: [] if side in initial.unmarked_feet else [name for name, m in pairs if on(m.segment, foot)]
-        for side, foot in initial.feet.items()
-    }
 
 
 def known_ground(
@@ -221,7 +184,7 @@ def _known_ground(
             by_motion += [*shear.notes, *gains.notes]
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
     wrenches = [shear.zeroed(each) for each in (all_of_it, righted) if each is not None]
-    judged = _judged(recording, initial, markers, wrenches, loads, check, may, by_plate, tolerance)
+    judged = judged_by_motion(recording, initial, markers, wrenches, loads, check, may, by_plate, tolerance)
     notes = [*by_motion, *check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
     reasons = [*([VERTICAL_ONLY] if shear.unmeasured else []), *judged.reasons]
     undeclared = judged.undeclared
@@ -287,89 +250,6 @@ def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str |
     return f'. If {plate} bears the {names[0]}, say so in a configuration: plates = {{ "{plate}" = "{names[0]}" }}'
 
 
-class _Judged(NamedTuple):
-    """As in `Ground`, by the motion of the centre of mass; beyond (T, F): feet whose plate is not to be believed."""
-
-    bears: Flags
-    undeclared: Flags
-    beyond: Flags
-    load_ratio: float | None
-    notes: list[Message]
-    reasons: list[Message]
-
-
-def _judged(
-    recording: Recording,
-    initial: CalibratedModel,
-    markers: Array,
-    wrenches: list[Array],
-    loads: FootLoads | None,
-    check: PlateCheck,
-    may: Flags,
-    by_plate: list[bool],
-    tolerance: float | None,
-) -> _Judged:
-    """Whether the plates carry what the motion needs, where feet and plates say that they carry the person.
-
-    Args:
-        wrenches: (T, 6) of all plates, and, where one is found to have another gain, the same without that.
-    """
-    wrench = wrenches[0]
-    n, names, notes, reasons = recording.n_frames, list(initial.contacts), list[Message](), list[Message]()
-    measured: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
-    claimed = measured if loads is None else loads.total_known
-    undeclared = np.zeros(n, dtype=bool) if loads is None else loads.elsewhere.copy()
-    beyond = np.zeros((n, len(initial.feet)), dtype=bool)
-    if not measured.all():
-        reasons.append(
-            note("sum of the plates", f"The plates are not measured in {n - int(measured.sum())} of {n} frames.")
-        )
-    if loads is not None:
-        notes += [text for text in loads.messages if text not in loads.reasons]
-        reasons += loads.reasons
-    unmeasured = None if all(by_plate) else np.asarray(may.any(axis=1))
-    pulling = [k for k, name in enumerate(names) if name != SEAT]
-    pulls = None if unmeasured is None else np.asarray(may[:, pulling].any(axis=1))
-    found, *without = [closure(initial, recording.time, markers, each, claimed, unmeasured, pulls) for each in wrenches]
-    if found is None:
-        flies = loads is not None and bool(loads.aloft.all(axis=1).any())  # which weighs nobody
-        foreign = None if flies or names else _foreign_load(check, wrench, claimed, initial, tolerance)
-        reasons += [foreign] if foreign else []
-        return _Judged(
-            may, undeclared | (foreign is not None), beyond, None, [*notes, note("plates", UNJUDGED)], reasons
-        )
-    bears = bearing(found, may, names, by_plate, claimed, recording.rate)
-    if bears.any():
-        reasons.append(note("plates", _declared_in_words(found, bears, names, recording.time)))
-        found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
-    undeclared |= found.undeclared | _nearly_all(found)
-    if found.undeclared.any() and any(each is not None and not each.undeclared.any() for each in without):
-        words = f"In {np.count_nonzero(found.undeclared)} of {n} frames the plates' sum is not used because of that."
-        reasons.append(note("sum of the plates", words))
-    elif found.undeclared.any():
-        text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench, loads)
-        reasons.append(text)
-    if found.too_much is not None and loads is not None:  # where the other foot is off the plates, too
-        undeclared[:], beyond[:] = True, True
-        reasons.append(
-            warning(
-                "weight",
-                f"the plates carry {found.too_much:.2f} times what the motion needs of "
-                f"{initial.weighed_kg:.1f} kg, all the time: their scale or the mass is wrong, or a load is not "
-                "declared. No moment of the legs is given. Check the plates' units, --mass, and [[loads]].",
-            )
-        )
-    if found.unjudged > MANY * n:
-        notes.append(
-            note(
-                "plates",
-                f"In {found.unjudged} of {n} frames too few markers are seen to check that the plates carry the "
-                "person.",
-            )
-        )
-    return _Judged(bears, undeclared, beyond, found.load_ratio, notes, reasons)
-
-
 def _light_feet(before: FootLoads, loads: FootLoads, beyond: Flags) -> list[Message]:
     """Sentences on feet whose plate was measured and reads next to nothing where something undeclared bears."""
     found = list[Message]()
@@ -406,145 +286,3 @@ def _brought_into_step(
             "in step", f"{words} Not all of the body is marked, so that no better is known: synchronise both."
         )
     return replace(ground, notes=(said, *ground.notes), behind_s=delay.delay_s, clock_sd_s=delay.sd_s), known
-
-
-def _nearly_all(found: Closure) -> bool:
-    judged = np.isfinite(found.excess[:, 1])
-    return bool(np.count_nonzero(found.undeclared & judged) > _NEARLY_ALL * np.count_nonzero(judged))
-
-
-def _declared_in_words(found: Closure, bears: Flags, names: list[str], time: Array) -> str:
-    """A sentence on when declared contacts bear, and on how much the plates lack there."""
-    spans = [
-        f"the {name} from {', '.join(f'{time[a]:.2f} to {time[b - 1]:.2f} s' for a, b in runs(bears[:, c]))}"
-        for c, name in enumerate(names)
-        if bears[:, c].any()
-    ]
-    excess = np.abs(found.excess[bears.any(axis=1)])
-    size = f" (up to {np.nanmax(excess):.0f} N by the motion)" if np.isfinite(excess).any() else ""
-    rests = " What is lacking all the time rests on the mass (--mass), as do the deviations." if found.steady else ""
-    return (
-        f"Declared contacts bear what the plates lack{size}: {' and '.join(spans)}. The total wrench is not measured "
-        f"there; what depends on these contacts is derived from the motion.{rests}"
-    )
-
-
-def _undeclared_in_words(
-    found: Closure,
-    recording: Recording,
-    initial: CalibratedModel,
-    markers: Array,
-    wrench: Array,
-    loads: FootLoads | None,
-) -> tuple[Message, Flags]:
-    """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts: what they have
-    too much is under a foot that stands alone (a load that somebody carries is between two)."""
-    time, feet = recording.time, foot_markers(initial)
-    beyond = np.zeros((len(time), len(feet)), dtype=bool)
-    judged = np.isfinite(found.excess[:, 1])
-    weight = initial.weighed_kg * GRAVITY_M_S2
-    if _nearly_all(found):
-        load = float(np.nanmean(wrench[judged, 1])) / GRAVITY_M_S2
-        x, up, z = (float(np.nanmean(found.excess[judged, axis])) for axis in range(3))
-        if np.hypot(x, z) > abs(up):
-            text = (
-                f"{not_zeroed(-x, -z, weight)}: they were not zeroed, or something that no plate measures pulls the "
-                "person all the time. Their sum is not used."
-            )
-            return warning("zero", text), beyond
-        named = likely_unit(load * GRAVITY_M_S2, initial.weighed_kg)
-        unit = f", or the forces are in {named}, not N" if named else ""
-        return (
-            warning(
-                "weight",
-                f"the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
-                f"(by the motion {load + up / GRAVITY_M_S2:.1f} kg): the mass "
-                "is wrong, a plate is missing, plates and markers are out of step, or something "
-                f"that no plate measures bears or pulls the person (a seat, a weight, a cable, a rail){unit}. The "
-                "plates are not used for the total.",
-            )
-        ), beyond
-    spans, sizes, away = list[str](), list[tuple[float, int]](), list[float]()
-    for first, end in runs(found.undeclared):
-        spans.append(f"{time[first]:.2f} to {time[end - 1]:.2f} s")
-        excess = found.excess[first:end]
-        if not np.isfinite(excess).any():  # not judged, but far from the weight
-            sizes.append((weight - float(np.median(wrench[first:end, 1])), 1))
-            continue
-        worst = np.unravel_index(int(np.nanargmax(np.abs(excess))), excess.shape)
-        sizes.append((float(excess[worst]), int(worst[1])))
-        if sizes[-1][1] != 1:
-            continue
-        place = np.broadcast_to(found.place(slice(first, end)), (end - first, 2))
-        for k, names in enumerate(feet.values()):
-            own = [m for m, name in enumerate(initial.recorded_markers) if name in names]
-            if not own:
-                continue
-            distance = distance_to_hull(place, markers[first:end][:, own][:, :, [0, 2]])
-            if np.isfinite(distance).any():
-                away.append(float(np.nanmedian(distance)))
-                under = sizes[-1][0] > 0.0 or (loads is not None and _stands_alone(loads, k, slice(first, end)))
-                beyond[first:end, k] = under and away[-1] < NEAR_M
-    size, axis = max(sizes, key=lambda pair: abs(pair[0]))
-    near = f", {min(away):.2f} m or more from the feet" if away and not beyond.any() else ""
-    return (
-        warning(
-            "plates",
-            f"the plates carry up to {abs(size):.0f} N {'less' if size > 0.0 else 'more'} "
-            f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({100.0 * abs(size) / weight:.0f} % of "
-            f"the weight, expected within {100.0 * found.limits[0]:.0f} %, and {100.0 * found.limits[1]:.0f} % for "
-            "longer than a second): something that no plate measures bears or pulls the person there (a seat, a "
-            f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The plates' sum is not used there.",
-        )
-    ), beyond
-
-
-def _stands_alone(loads: FootLoads, k: int, frames: slice) -> bool:
-    """Whether foot number k is the only one on a plate in most of the frames."""
-    standing: Flags = np.asarray(loads.on[frames].any(axis=2))
-    return bool((standing[:, k] & (standing.sum(axis=1) == 1)).mean() > 0.5)
-
-
-def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unseen_kg: float = 0.0) -> Message | None:
-    """Sentences where the plates contradict the mass: by `Ground.load_ratio`, or, where that is not known, by the mean
-    vertical force of the known frames of the wrench (T, 6)."""
-    load = _mean_load_kg(wrench, least=50) if load_ratio is None else load_ratio * mass_kg
-    within = MASS_APART + UNSEEN_APART * unseen_kg / mass_kg
-    if load is None or abs(load - mass_kg) <= within * mass_kg:
-        return None
-    carried = ", or a load is carried (moments of back and arms are wrong by it)" if load > mass_kg else ""
-    return warning(
-        "weight",
-        f"the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
-        f"({100.0 * abs(load - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
-        f"mass{carried}. Forces, moments and inertia take the error on.",
-    )
-
-
-def _foreign_load(
-    check: PlateCheck, wrench: Array, claimed: Flags, initial: CalibratedModel, tolerance: float | None
-) -> Message | None:
-    """A sentence where the plates' mean load is not the person's weight, for recordings that `closure` cannot judge.
-
-    Args:
-        tolerance: part of the weight by which they may differ; None: nobody asks.
-    """
-    mass_kg = initial.weighed_kg
-    if initial.feet:
-        load, mean = _mean_load_kg(wrench[claimed], least=1), " on average"
-    else:
-        load, mean = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg, ""
-    if tolerance is None or load is None or abs(load - mass_kg) <= tolerance * mass_kg:
-        return None
-    return warning(
-        "weight",
-        f"the plates carry {load:.1f} kg{mean} where the person weighs {mass_kg:.1f} kg (more than "
-        f"{100.0 * tolerance:.0f} % apart): the mass is wrong, or something that the model does not have bears on them "
-        "(a weight, a cable, a rail, a foot off the plates). The plates are not used for the total.",
-    )
-
-
-def _mean_load_kg(wrench: Array, least: int) -> float | None:
-    """Mean vertical force of the known frames of a wrench (T, 6) as a mass; None of fewer than ``least``."""
-    push = wrench[np.isfinite(wrench).all(axis=1), 1]
-    return float(push.mean()) / GRAVITY_M_S2 if len(push) >= least else None

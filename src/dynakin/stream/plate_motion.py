@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from dynakin.filter.plate_clock import Delay
 from dynakin.filter.plate_motion import Needed, plates_delay, turned_axes
-from dynakin.filter.total_wrench import doubtful_mass
+from dynakin.filter.plate_sum import doubtful_mass
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.orientation import axis_vector

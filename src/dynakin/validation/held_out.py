@@ -12,7 +12,8 @@ from dynakin.blas import one_blas_thread
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.total_wrench import doubtful_mass, known_ground
+from dynakin.filter.plate_sum import doubtful_mass
+from dynakin.filter.total_wrench import known_ground
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
