@@ -93,9 +93,24 @@ def tilted(plate: Plate) -> Plate:
     return pressed("tilted", plate.force[:, [1]] * [0.002, 1.0, -0.001], np.nan_to_num(plate.cop))
 
 
+def noisy(plate: Plate, sd_n: float) -> Plate:
+    """Its vertical force, and noise of the others."""
+    rng = np.random.default_rng(4)
+    force = rng.normal(scale=[sd_n, 0.0, sd_n], size=(N, 3)) + plate.force * [0.0, 1.0, 0.0]
+    return pressed("noisy", force, np.nan_to_num(plate.cop))
+
+
+INCLINED = tuple(
+    pressed("inclined", step(at).force[:, [1]] * [0.03, 1.0, 0.0], np.nan_to_num(step(at).cop)) for at in (0.2, 0.9)
+)
+
+
 @pytest.mark.parametrize(
     ("plates", "alone"),
     [
+        ((noisy(step(0.2), 1.0), noisy(GOOD, 1.0)), True),
+        ((noisy(step(0.2), 8.0), noisy(GOOD, 8.0)), False),
+        (INCLINED, True),
         (tuple(edited(step(at), force={0: 0.0, 2: 0.0}) for at in (0.2, 0.9)), True),
         (tuple(edited(step(at), force={0: 2.0, 2: -1.0}) for at in (0.2, 0.9)), True),  # an amplifier's zero
         ((tilted(step(0.2)), tilted(GOOD)), True),
@@ -107,7 +122,10 @@ def tilted(plate: Plate) -> Plate:
     ],
 )
 def test_plates_that_measure_the_vertical_force_alone_are_known(plates: tuple[Plate, ...], alone: bool) -> None:
-    assert vertical_only(recorded(*plates)) is alone
+    made = recorded(*plates)
+    assert vertical_only(made) is alone
+    if alone:  # what no plate has is no dead channel
+        assert without_dead_channels(made) is made
 
 
 def at(plate: Plate, name: str, moved: float = 0.0) -> Plate:

@@ -112,9 +112,10 @@ def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None
     if refusal is not None:
         return rows
     figures = ready.moment_figures()
-    rows += [("Results", text) for text in (figures["verdict"], *figures["reasons"])]
     doubts = [message for message in warnings_of(ready.messages) if message not in said]
-    rows += [("Doubts", message) for message in doubts if sentence(message.text) not in figures["reasons"]]
+    there = [sentence(message.text) for message in doubts]  # with what to do
+    rows += [("Results", text) for text in (figures["verdict"], *figures["reasons"]) if text not in there]
+    rows += [("Doubts", message) for message in doubts]
     return rows + [("Time", text) for text in _time(ready)]
 
 

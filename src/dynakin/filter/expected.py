@@ -192,8 +192,8 @@ def _given_plate(prior: Prior, wrench: Array, errors: Array) -> Prior:
     stay those of the prior as far as the plate leaves them open, so that they last from frame to frame."""
     S = prior.spread
     seen = np.swapaxes(np.linalg.solve(errors, S), 1, 2)  # S' R^-1
-    factor = np.linalg.cholesky(np.eye(6) + seen @ S)
-    spread = np.swapaxes(np.linalg.solve(factor, np.swapaxes(S, 1, 2)), 1, 2)
+    back = (np.eye(6) + seen @ S)[:, ::-1, ::-1]  # backwards, so that the root of its inverse is a lower one
+    spread = np.swapaxes(np.linalg.solve(np.linalg.cholesky(back), np.swapaxes(S[..., ::-1], 1, 2)), 1, 2)[..., ::-1]
     told = np.linalg.solve(errors, (wrench - prior.mean)[..., None])
     return Prior(prior.mean + (spread @ (np.swapaxes(spread, 1, 2) @ told))[..., 0], spread)
 

@@ -101,8 +101,8 @@ def found_gains(needed: Needed, plates: Sequence[Plate], wrenches: Array, known:
         found = max(apart, key=lambda each: abs(each.log) / each.sd, default=None)
         if found is None or abs(found.log) < max(np.log1p(APART), SIGMAS * found.sd):
             return PlateGains(off, factor, tuple(notes))
-        if not found.alike:
-            return none
+        if not found.alike:  # something else bears, too, and may be what the others lack
+            return PlateGains(off, factor, tuple(notes))
         plate, by, only_two = found.plate, float(np.exp(found.log)), len(asked) == 2
         off[asked if only_two else plate] = abs(1.0 - 1.0 / by)
         factor[plate] = 1.0 if only_two else by
@@ -116,9 +116,10 @@ def found_gains(needed: Needed, plates: Sequence[Plate], wrenches: Array, known:
 def _in_words(plate: str, others: str, by: float, sd: float, only_two: bool) -> str:
     there = f"{plate} or {others}" if only_two else plate
     return (
-        f"the plates' vertical forces contradict each other: of what the motion needs {plate} has {by:.2f} times as "
-        f"much as {others} (standard deviation {sd:.2f}, expected within {APART:.0%}): the gain of {there}, or of one "
-        "of its sensors, is wrong, or something else bears or pulls the person there. Deviations of moments hold that "
+        f"the plates' vertical forces contradict each other: beside what the motion needs, {plate} shows {by:.2f} "
+        f"times what {others} does (standard deviation {sd:.2f}, expected within {100.0 * APART:.0f} %): the gain of "
+        f"{there}, or of one of its sensors, is wrong, or something else bears or pulls the person there. Deviations "
+        "of moments hold that "
         f"difference where a foot is on {there}."
     )
 

@@ -98,12 +98,6 @@ def judged_by_motion(
         reasons.append(note("plates", _declared_in_words(found, bears, names, recording.time)))
         found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
     undeclared |= found.undeclared | _nearly_all(found)
-    if found.undeclared.any() and any(each is not None and not each.undeclared.any() for each in without):
-        words = f"In {np.count_nonzero(found.undeclared)} of {n} frames the plates' sum is not used because of that."
-        reasons.append(note("sum of the plates", words))
-    elif found.undeclared.any():
-        text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench, loads)
-        reasons.append(text)
     if found.too_much is not None and loads is not None:  # where the other foot is off the plates, too
         undeclared[:], beyond[:] = True, True
         reasons.append(
@@ -114,6 +108,15 @@ def judged_by_motion(
                 "declared. No moment of the legs is given. Check the plates' units, --mass, and [[loads]].",
             )
         )
+    elif found.undeclared.any() and any(each is not None and not each.undeclared.any() for each in without):
+        words = (
+            f"In {np.count_nonzero(found.undeclared)} of {n} frames the plates' sum is not used, because of the gain "
+            "of a plate."
+        )
+        reasons.append(note("sum of the plates", words))
+    elif found.undeclared.any():
+        text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench, loads)
+        reasons.append(text)
     if found.unjudged > MANY * n:
         notes.append(
             note(

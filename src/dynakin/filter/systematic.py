@@ -17,6 +17,7 @@ import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
+from dynakin.filter.contacts import any_off_plates, wrenches_of
 from dynakin.filter.error_sizes import KINDS, OF_JOINTS, Sizes, less_sure_joints, usual_sizes
 from dynakin.filter.joint_errors import SKIN_ANGLE_RAD, JointErrors, drives, floats, neutral, rolls
 from dynakin.filter.limbs import unseen_limbs, unsure_moments
@@ -33,7 +34,6 @@ from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
     import xarray as xr
-from dynakin.filter.contacts import any_off_plates, wrenches_of
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]

@@ -47,7 +47,7 @@ class IdentifyingTrial:
     initial: the model as measured there. estimates: by preset. static: the recording that lengths were measured on.
     wrench: (T, 6) N and N m, the plates', as `measured_wrench`; ground: of the same laboratory, given to the judging
     trial too where both are one recording. subject: what `identify_subject` makes of the trial, where that was asked
-    (`identification.held_out`).
+    (`identification.subject.with_subject`).
     """
 
     recording: Recording

@@ -105,7 +105,7 @@ def find_locks(
         rule = segment.without_markers
         if model.sided and rule is None:
             if segment.parent == "ground" or name in marked:
-                continue  # what hangs on it shows how it moves, as far as it does (`observed`)
+                continue  # what hangs on it shows how it moves, as far as it does
             rule = WithoutMarkers(lock_to=segment.parent)
         if rule is None:
             parts = {name, *segment.parts}

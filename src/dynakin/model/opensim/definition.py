@@ -43,9 +43,6 @@ from dynakin.units import gravity_problem
 _MODEL_M = 0.003
 """Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
 normalised innovations are consistent with it (1.1), and far too large with the cameras' noise alone (1.9 to 18)."""
-_SCALED_SHIFT_M, _SCALED_TURN_DEG = 0.002, 2.0
-"""How much further off, or turned, a segment's markers may be together than if the person's own landmarks had shown
-the segment (`docs/validation/held_out.md`)."""
 _SKIN_LASTS = 10.0 / 3.0
 """The skeleton's joints do not hang on the markers, so that what these show apart from it is skin, which moves slowly:
 0.5 s with the default noise (`docs/validation/held_out.md`)."""
@@ -197,11 +194,7 @@ class OpenSimDefinition:
         }
         skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
         kinds, known = kinds_of(spec.segments), priors or Priors()
-        known = known.changed(
-            marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))),
-            cluster_shift_sd_m=float(np.hypot(known.cluster_shift_sd_m, _SCALED_SHIFT_M)),
-            cluster_turn_sd_deg=float(np.hypot(known.cluster_turn_sd_deg, _SCALED_TURN_DEG)),
-        )
+        known = known.changed(marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
         together = places_prior(places, {marker.name: marker.body for marker, _ in chosen}, known)
         state, said = starting_state(
             spec,

@@ -13,8 +13,9 @@ from dynakin.messages import Message, note
 from dynakin.recordings.recording import Array
 
 _UNLABELLED = re.compile(r"^(\*\d*|_?(unlabell?ed|unidentified|unnamed|uname)\W*\d*)$", re.IGNORECASE)
-# What outputs are called, where no list names them: LHipAngles, RKneeMoment_1
-_OUTPUT = re.compile(r"[a-z0-9](Angles?|Forces?|Moments?|Powers?|GRF)(_\w+)?$")
+# What outputs are called, where no list names them: LHipAngles, RKneeMoment_1, r_knee_moment (an
+# l_inferior_angle may be the scapula's)
+_OUTPUT = re.compile(r"([a-z0-9](Angles?|Forces?|Moments?|Powers?|GRF)|_(forces?|moments?|powers?|grf))(_\w+)?$")
 _CENTRE_OF_MASS = re.compile(
     r"^(cent(re|er)_?of_?(mass|gravity)(_?(floor|[xyz]))?|com(floor)?|cog|whole_?body_?com)$", re.I
 )

@@ -87,8 +87,8 @@ _KINDS = (
     _Kind(
         "Plates' gain",
         ("gain",),
-        "Correct the calibration (or the unit) of the channels named, in the file of the forces; if by the film "
-        "something else bears the person there, declare it (--contact).",
+        "Weigh something of known mass on each plate, and correct the calibration (or the unit) in the file of the "
+        "forces; if by the film something else bears the person there, declare it (--contact).",
     ),
     _Kind(
         "Plates' horizontal forces",
