@@ -60,7 +60,7 @@ def test_a_plate_of_another_gain_is_named_whatever_the_person_weighs(part: float
     ready, right = person(mass_kg).prepare(recording), person(mass_kg).prepare(walk())
     (text,) = said_of_gains(ready)
     assert "plate 2 shows" in text and not said_of_gains(right) and right.ground.off_gain is None
-    assert float(text.split("plate 2 has ")[1].split()[0]) == pytest.approx(part, abs=0.02)
+    assert float(text.split("plate 2 shows ")[1].split()[0]) == pytest.approx(part, abs=0.02)
     on = recording.plates[1].force[:, 1] > 20.0
     assert ready.ground.off_gain is not None
     assert ready.ground.off_gain[on].max(axis=1) == pytest.approx(abs(1.0 - 1.0 / part), abs=0.02)
@@ -99,7 +99,7 @@ def test_a_sensor_that_says_too_little_is_found_by_what_the_plate_lacks() -> Non
         return replace(plate, force=force, moment=moment)
 
     (text,) = said_of_gains(person().prepare(with_plate(walk(), 1, lacking)))
-    assert "plate 2 has 0.9" in text
+    assert "plate 2 shows 0.9" in text
 
 
 def test_of_two_plates_nobody_knows_which_is_wrong(data_dir: Path) -> None:
