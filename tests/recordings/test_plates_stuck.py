@@ -151,6 +151,12 @@ def test_the_same_rows_at_different_places_are_measured_at_none() -> None:
     assert "plate 1 and plate 3" in said.text and "Neither is measured" in said.text
 
 
+def test_halves_of_a_movement_in_a_plane_are_no_doubles() -> None:
+    halves = [at(edited(GOOD, force={2: 0.0}, cop={2: 0.1}), f"plate {k}", moved=0.5 * k) for k in (0, 1)]
+    made = recorded(*halves)
+    assert without_doubles(made) is made
+
+
 def test_plates_with_loads_of_their_own_or_none_are_no_doubles() -> None:
     noisy = at(GOOD, "plate 3")
     noisy = replace(noisy, force=noisy.force + np.random.default_rng(1).normal(0.0, 0.1, noisy.force.shape))

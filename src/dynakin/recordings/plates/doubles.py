@@ -25,8 +25,13 @@ def without_doubles(recording: Recording) -> Recording:
     for first, second in combinations(recording.plates, 2):
         if first.name not in plates or second.name not in plates or not _same_load(first, second):
             continue
-        both = f"{first.name} and {second.name} hold the same forces in every row"
-        if _same_place(first, second):
+        both, one_place = (
+            f"{first.name} and {second.name} hold the same forces in every row",
+            _same_place(first, second),
+        )
+        if not one_place and _in_a_plane(first):
+            continue
+        if one_place:
             del plates[second.name]
             text = f"{both}, at the same place: one plate that is listed twice. {second.name} is left out"
         else:
@@ -49,3 +54,12 @@ def _same_place(first: Plate, second: Plate) -> bool:
         return bool(np.abs(first.corners.mean(axis=0) - second.corners.mean(axis=0)).max() < SAME_M)
     away = np.abs(first.cop - second.cop)
     return bool(np.isfinite(away).any() and np.nanmax(away) < SAME_M)
+
+
+def _in_a_plane(plate: Plate) -> bool:
+    """Whether a plate has nothing along one axis, neither force nor a centre of pressure that moves: of a movement that
+    was made in a plane, each foot bears just half."""
+    pressed = np.isfinite(plate.cop).all(axis=1)
+    if not pressed.any():
+        return False
+    return bool(((np.ptp(plate.cop[pressed], axis=0) < SAME_M) & ~plate.force[pressed].any(axis=0)).any())
