@@ -57,9 +57,7 @@ def _same_place(first: Plate, second: Plate) -> bool:
 
 
 def _in_a_plane(plate: Plate) -> bool:
-    """Whether a plate has nothing along one axis, neither force nor a centre of pressure that moves: of a movement that
-    was made in a plane, each foot bears just half."""
-    pressed = np.isfinite(plate.cop).all(axis=1)
-    if not pressed.any():
-        return False
-    return bool(((np.ptp(plate.cop[pressed], axis=0) < SAME_M) & ~plate.force[pressed].any(axis=0)).any())
+    """Whether a plate's centre of pressure moves along one axis alone: of a movement that was made in a plane, each
+    foot bears just half."""
+    pressed = plate.cop[np.isfinite(plate.cop).all(axis=1)]
+    return bool(len(pressed) and np.count_nonzero(np.ptp(pressed, axis=0) < SAME_M) >= 2)
