@@ -109,6 +109,7 @@ def test_a_recorded_session_is_read_as_a_file_is(tmp_path: Path) -> None:
     assert np.isnan(found.plates[0].force[110:150]).all() and np.isfinite(found.plates[1].force[:280]).all()
     said = " ".join(map(str, found.notes))
     assert "m2 by" in said and "a repeats one and the same row" in said
+    assert "from 1.01 to 1.49 s" in said and "its connection hung." in said and "as long as it does" not in said
 
 
 def test_a_frame_shows_which_plate_is_not_measured() -> None:

@@ -25,10 +25,11 @@ def walk() -> Recording:
     return simulate("fullbody", "gait", 2).recording
 
 
-def live(recording: Recording, markers: Array) -> tuple[Array, list[str]]:
-    """What is left of the frames, as they come, and what is said."""
+def live(recording: Recording, markers: Array, frames: Array | None = None) -> tuple[Array, list[str]]:
+    """What is left of the frames, or of those that come, as they come, and what is said."""
     watch = LiveMarkers(recording.marker_names, recording.rate)
-    left = np.stack([watch.look(t, frame) for t, frame in zip(recording.time, markers, strict=True)])
+    frames = np.arange(len(markers)) if frames is None else frames
+    left = np.stack([watch.look(float(recording.time[k]), markers[k]) for k in frames])
     return left, [str(message) for message in watch.news()]
 
 
@@ -77,6 +78,62 @@ def test_labels_that_change_places_are_put_right_at_once() -> None:
     assert len(said) == 1 and "r_toe and r_5meta change places at 1.00 s" in said[0].replace(
         "r_5meta and r_toe", "r_toe and r_5meta"
     )
+
+
+@pytest.mark.parametrize("changes_back", [True, False])
+@pytest.mark.parametrize("what", ["both hidden", "one hidden", "time gap", "one frame lost"])
+def test_labels_that_may_change_back_unseen_are_told_by_the_markers_near(what: str, changes_back: bool) -> None:
+    recording = walk()
+    markers, frames, a = faulty("r_toe", 1.0, 1.2 if changes_back else 99.0)
+    b = recording.marker_names.index("r_5meta")
+    markers[frames[:, None], [a, b]] = markers[frames[:, None], [b, a]]
+    unseen = np.flatnonzero((recording.time >= 1.15) & (recording.time < 1.25))
+    if what == "one frame lost":
+        unseen = unseen[unseen == np.searchsorted(recording.time, 1.2 - 1e-9)]
+    if "hidden" in what:
+        markers[unseen[:, None], [a, b] if what == "both hidden" else [a]] = np.nan
+        left, said = live(recording, markers)
+        kept = np.isfinite(left).all(axis=2)
+        assert kept[np.setdiff1d(np.arange(len(kept)), unseen)].all()
+        np.testing.assert_array_equal(left[kept], recording.markers[kept])
+    else:
+        rest = np.delete(np.arange(len(markers)), unseen)
+        left, said = live(recording, markers, rest)
+        np.testing.assert_array_equal(left, recording.markers[rest])
+    assert len(said) == 1 and "change places at 1.00 s" in said[0]
+
+
+def test_labels_of_which_nobody_can_tell_whether_they_changed_back_are_taken_as_they_come_and_named() -> None:
+    recording = walk()
+    markers, frames, a = faulty("r_toe")
+    b = recording.marker_names.index("r_5meta")
+    markers[frames[:, None], [a, b]] = markers[frames[:, None], [b, a]]
+    after = np.arange(frames[-1] + 1, len(markers))
+    others = np.delete(np.arange(markers.shape[1]), [a, b])
+    markers[after[:5]] = np.nan
+    markers[after[5]] += np.nan
+    markers[after[5], [a, b]] = recording.markers[after[5], [a, b]]  # nothing near is seen yet
+    markers[after[6], others] *= 1.5
+    left, said = live(recording, markers)
+    assert np.isnan(left[after[5], [a, b]]).all()
+    np.testing.assert_array_equal(left[after[7:]][:, [a, b]], recording.markers[after[7:]][:, [a, b]])
+    assert any("r_5meta still are exchanged cannot be told" in text or "r_toe still are" in text for text in said)
+
+
+def test_two_markers_near_which_none_ever_was_are_taken_as_they_come_after_a_gap() -> None:
+    recording = walk()
+    a, b = map(recording.marker_names.index, ("r_toe", "r_5meta"))
+    frames = np.flatnonzero((recording.time >= 1.0) & (recording.time < 1.2))
+    came = recording.markers[:, [a, b]].copy()
+    came[frames] = came[frames][:, ::-1]
+    came[frames[-1] : frames[-1] + 3] = np.nan
+    watch = LiveMarkers(("a", "b"), recording.rate)
+    watch.look(float(recording.time[frames[0] - 1]), came[frames[0] - 1])
+    watch._order[:] = [1, 0]  # nothing beside them shows a leap
+    after = np.arange(frames[0], len(came))
+    left = np.stack([watch.look(float(recording.time[k]), came[k]) for k in after])
+    np.testing.assert_array_equal(left[25:], recording.markers[after[25:]][:, [a, b]])
+    assert any("cannot be told" in str(message) for message in watch.news())
 
 
 @pytest.mark.parametrize("names", [("r_knee",), ("r_calc", "r_toe")])

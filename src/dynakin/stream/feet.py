@@ -208,7 +208,8 @@ class LiveFeet:
         if plates and not loads.total_known[0]:
             self._say(
                 "The plates do not carry all of the person (a foot off the plates, a load where nobody stands, a plate "
-                "at the end of its range): what they do not carry is estimated for as long as that is so."
+                "that hangs or is at the end of its range): what they do not carry is estimated for as long as that is "
+                "so."
             )
         return loads
 

@@ -107,6 +107,11 @@ class Fusion:
             return []
         return [(self.plates.names[p], since) for p, since in self._resampled.frozen]
 
+    @property
+    def frozen_until(self) -> list[float]:
+        """Until when each of these did, so far, s."""
+        return [] if self._resampled is None else self._resampled.frozen_until
+
     def markers_silent(self, now_s: float) -> bool:
         """Whether nothing comes from the markers."""
         return now_s - self._marker_arrived > max(SILENT_S, 3.0 * self.period_s)

@@ -43,6 +43,10 @@ jumps of 20 and 30 mm as many are found as of a file (81 and 100 %, 88 and 99)."
 _LEAST = 4  # frames before one that can be judged
 _CONTINUES = 0.5
 """Of what two markers leap by, at most, is left where each goes on as the other: their labels have changed places."""
+_CLEARLY = 0.5
+"""Whether labels still are exchanged is told where one way misses the distances to those near by at most so large a
+part of what the other way does."""
+_STAYS_M = 0.001  # by which the distance of two markers on one segment changes
 _AGAIN_S = 60.0  # the same of the same marker is said once in so long
 
 
@@ -65,6 +69,29 @@ class _Off:
     shows: bool = False
 
 
+@dataclass(eq=False)
+class _Doubt:
+    """Exchanged labels that may have changed back while one of them was not seen.
+
+    Attributes:
+        near: for each of them, (K,) markers by which its place is known. usual: (K,) m, as far as it was from them.
+        by: (K,) how much each counts, more where the distance stays what it is.
+    """
+
+    near: list[npt.NDArray[np.intp]]
+    usual: list[Array]
+    by: list[Array]
+
+    def misses_m(self, positions: Array, places: Array) -> Array:
+        """How far each place (G, 3) is from being theirs, by what is seen near them (M, 3); NaN where nothing is."""
+        found = np.full(len(places), np.nan)
+        for k, (near, usual, by) in enumerate(zip(self.near, self.usual, self.by, strict=True)):
+            miss = np.abs(np.linalg.norm(positions[near] - places[k], axis=1) - usual)
+            if (known := np.isfinite(miss)).any():
+                found[k] = np.average(miss[known], weights=by[known])
+        return found
+
+
 class LiveMarkers:
     """Takes each frame of a stream, in order, and says which of its samples are none.
 
@@ -78,6 +105,8 @@ class LiveMarkers:
         self._last = np.full((len(names), 3), np.nan)  # with it
         self._begun: list[Array] = []  # the first frames: where markers belong
         self._order = np.arange(len(names))
+        self._doubts: dict[tuple[int, ...], _Doubt] = {}  # of labels that are exchanged
+        self._unclear: set[int] = set()
         self._off: dict[int, _Off] = {}
         self._held: set[int] = set()
         self._time, self._same, self._repeats = -np.inf, 0, False
@@ -94,11 +123,15 @@ class LiveMarkers:
     def look(self, time_s: float, positions: Array) -> Array:
         """The next frame (M, 3) m, NaN where it is no measurement; the same array where all of it is one."""
         if not 0.0 < time_s - self._time < 1.5 / self._rate:
+            for group in self._exchanged():
+                self._doubt(group)
             self._kept.clear()  # what lies between is not known: after a gap markers are found anew, as in a file
             self._off.clear()
             self._last = np.full_like(self._last, np.nan)
         self._time = time_s
-        positions = positions if (self._order[1:] > self._order[:-1]).all() else positions[self._order]
+        self._unclear.clear()
+        if not (self._order[1:] > self._order[:-1]).all():
+            positions = self._put_right(time_s, positions)
         last, self._last = self._last, positions
         still = (positions == last).all(axis=1)
         if still.any():
@@ -125,8 +158,74 @@ class LiveMarkers:
             self._follow(time_s, positions)
         return self._without(positions)
 
+    def _exchanged(self) -> list[tuple[int, ...]]:
+        """Markers that have each other's labels: pairs, or more."""
+        groups = []
+        for m in range(len(self._order)):
+            group = [m]
+            while self._order[group[-1]] > m:
+                group.append(int(self._order[group[-1]]))
+            if len(group) > 1 and self._order[group[-1]] == m:
+                groups.append(tuple(group))
+        return groups
+
+    def _doubt(self, group: tuple[int, ...]) -> None:
+        """Labels may change back from now on: where they were among those near is what tells."""
+        if group in self._doubts:
+            return
+        kept = np.stack(self._kept)
+        others = kept.copy()
+        others[:, group] = np.nan
+        doubt = _Doubt([], [], [])
+        for m in group:
+            others[:, m] = kept[:, m]
+            near = nearest(others, m)
+            apart = np.linalg.norm(kept[:, near] - kept[:, m : m + 1], axis=2)
+            off = np.abs(apart - (usual := usual_distances(apart, range(len(kept)))))
+            doubt.near.append(near)
+            doubt.usual.append(usual)
+            doubt.by.append(1.0 / (_STAYS_M + usual_distances(off, range(len(off)))))
+            others[:, m] = np.nan
+        self._doubts[group] = doubt
+
+    def _put_right(self, time_s: float, came: Array) -> Array:
+        """The frame with labels put right. Of those that were not seen for a while, or after a gap, the distances to
+        others say whether they still are exchanged; until these do, they are missing."""
+        groups = self._exchanged()
+        self._doubts = {group: doubt for group, doubt in self._doubts.items() if group in groups}
+        for group in groups:
+            if not np.isfinite(came[list(group), 0]).all():
+                self._doubt(group)
+        sure = came[self._order]
+        sure[[m for group in self._doubts for m in group]] = np.nan
+        for group, doubt in list(self._doubts.items()):
+            own = list(group)
+            seen = np.isfinite(came[own, 0])
+            other_way, as_it_comes = (doubt.misses_m(sure, came[which]) for which in (self._order[own], own))
+            known = (np.isfinite(as_it_comes) == seen).all() and np.isfinite(other_way).sum() == seen.sum()
+            a, b = float(np.nansum(other_way)), float(np.nansum(as_it_comes))
+            if known and a < _CLEARLY * b:
+                if seen.all():
+                    del self._doubts[group]
+                continue
+            never = not all(np.isfinite(usual).any() for usual in doubt.usual)
+            if never or (known and seen.any() and (b < _CLEARLY * a or seen.all())):
+                self._order[own] = own
+                del self._doubts[group]
+                if never or b >= _CLEARLY * a:
+                    names = " and ".join(self._names[m] for m in own)
+                    self._say(
+                        time_s, "as they come", own[0], f"whether the labels of {names} still are exchanged cannot be "
+                        f"told after a gap, at {time_s:.2f} s. They are taken as they come; look at them.",
+                    )  # fmt: skip
+                continue
+            self._unclear.update(m for m in own if np.isfinite(came[self._order[m], 0]))
+        positions = came[self._order]
+        positions[sorted(self._unclear)] = np.nan
+        return positions
+
     def _without(self, positions: Array) -> Array:
-        gone = self._held | self._off.keys()
+        gone = self._held | self._off.keys() | self._unclear
         if not gone:
             return positions
         self.left_out += 1

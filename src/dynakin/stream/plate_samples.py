@@ -44,6 +44,11 @@ class PlateSamples:
         return self._watch.found
 
     @property
+    def frozen_until(self) -> list[float]:
+        """Times of the last of each of these rows, s."""
+        return self._watch.until
+
+    @property
     def newest_s(self) -> float:
         """Time of the newest sample, -inf before there is one."""
         return float(self._time[-1]) if len(self._time) else -np.inf
@@ -118,6 +123,8 @@ class _Still:
     def __init__(self, rate_hz: float, count: int) -> None:
         self.rate_hz = rate_hz
         self.found: list[tuple[int, float]] = []
+        self.until: list[float] = []
+        self._at = np.zeros(count, dtype=int)  # places there of those that hang
         self._rows = np.zeros((0, count, 6))  # of the last second
         self._kept = round(_BEFORE_S * rate_hz)
         self._same = np.zeros(count, dtype=int)  # rows so far that equal the one before
@@ -134,6 +141,9 @@ class _Still:
             return lost
         for p in range(same.shape[1]):
             moved = np.flatnonzero(~same[:, p])
+            if self._hung[p]:
+                held = int(moved[0]) if len(moved) else len(same)
+                self.until[self._at[p]] = float(time[held - 1]) if held else self.until[self._at[p]]
             if len(moved):
                 self._same[p], self._hung[p] = 0, False
             run = len(same) - (int(moved[-1]) + 1 if len(moved) else 0)
@@ -142,7 +152,9 @@ class _Still:
                 continue
             if not self._hung[p] and self._stands_still(self._rows[:, p]):
                 self._hung[p] = True
+                self._at[p] = len(self.found)
                 self.found.append((p, float(time[-1]) - (int(self._same[p]) - 1) / self.rate_hz))
+                self.until.append(float(time[-1]))
             lost[-run:, p] = self._hung[p]
         return lost
 

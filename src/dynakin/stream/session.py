@@ -431,8 +431,10 @@ class Live:
                 self.say(
                     note(
                         "plates",
-                        f"Nobody has stood on the plates for {_UNLOADED * _CHECKED_S:.0f} s. If somebody does, look at "
-                        "their channels and the unit of their forces.",
+                        "The plates are not checked yet: in none of the last "
+                        f"{_UNLOADED * _CHECKED_S:.0f} s have they borne somebody for half of it, as they do while "
+                        "somebody stands or walks on them. If somebody does, look at their channels and the unit of "
+                        "their forces.",
                     )
                 )
             return

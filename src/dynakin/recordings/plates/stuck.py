@@ -77,16 +77,20 @@ def frozen(rows: Array, push: Array, rate_hz: float, least: tuple[int, float] = 
     return found
 
 
-def frozen_in_words(name: str, time: Array, lost: Flags) -> list[Message]:
-    """A warning of a plate some of whose rows (N,) are frozen."""
+def frozen_in_words(
+    name: str,
+    time: Array,
+    lost: Flags,
+    do: str = "Export the forces again, or look whether their recording was interrupted",
+) -> list[Message]:
+    """A warning of a plate some of whose rows (N,) are frozen, and what to do about it."""
     if not lost.any():
         return []
     return [
         warning(
             "plates",
             f"{name} repeats one and the same row while somebody stands on it, from {spans(time, runs(lost), MOST)}, "
-            "though its load moved before or jumps after: not measured there. Export the forces again, or look whether "
-            "their recording was interrupted.",
+            f"though its load moved before or jumps after: not measured there. {do}.",
         )
     ]
 

@@ -21,7 +21,7 @@ from dynakin.pipeline.result import Result
 from dynakin.pipeline.stages import run_case
 from dynakin.recordings.formats.trajectories import clean_markers
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
-from dynakin.recordings.plates.stuck import frozen_live_in_words, without_dead_channels
+from dynakin.recordings.plates.stuck import frozen_in_words, without_dead_channels
 from dynakin.recordings.recording import Recording
 from dynakin.results.files.folder import check_output_writable
 from dynakin.settings.defaults import DELAY_S
@@ -156,7 +156,8 @@ class Recorded(NamedTuple):
 
     Attributes:
         samples: fused as they were live. begun: what it began with: "settings", "subject" and "delay_s" (the last two
-            are not in old recordings). holes: where the file is damaged. frozen: plates that stood still, from when on.
+            are not in old recordings). holes: where the file is damaged. frozen: plates that stood still, from when
+            and until when.
     """
 
     samples: list[Fused]
@@ -164,7 +165,7 @@ class Recorded(NamedTuple):
     plates: StreamInfo | None
     begun: dict[str, Any]
     holes: list[Hole]
-    frozen: list[tuple[str, float]]
+    frozen: list[tuple[str, float, float]]
 
 
 def read_recorded(folder: str | Path) -> Recorded:
@@ -202,7 +203,8 @@ def read_recorded(folder: str | Path) -> Recorded:
     if damaged:
         holes.append(Hole(last_s, np.inf))
     found += fusion.poll(np.inf)
-    return Recorded(found, fusion.markers, fusion.plates, begun, holes, fusion.frozen_plates)
+    frozen = [(*plate, until) for plate, until in zip(fusion.frozen_plates, fusion.frozen_until, strict=True)]
+    return Recorded(found, fusion.markers, fusion.plates, begun, holes, frozen)
 
 
 def recorded(folder: str | Path) -> Recording:
@@ -254,7 +256,12 @@ def _recording(found: Recorded, folder: str | Path) -> Recording:
 def _as_read(recording: Recording, found: Recorded, folder: str | Path) -> Recording:
     """Without what is no measurement, as a file is read."""
     markers, notes = clean_markers(recording.marker_names, recording.markers, recording.time, Path(folder) / FILE)
-    notes += [frozen_live_in_words(name, since_s) for name, since_s in found.frozen]
+    for name in dict.fromkeys(name for name, _, _ in found.frozen):
+        lost = np.zeros(recording.n_frames, dtype=bool)
+        for which, since_s, until_s in found.frozen:
+            first, end = np.searchsorted(recording.time, since_s), np.searchsorted(recording.time, until_s, "right")
+            lost[first : max(end, first + 1)] |= which == name
+        notes += frozen_in_words(name, recording.time, lost, "Look whether its amplifier or its connection hung")
     return without_dead_channels(replace(recording, markers=markers, notes=(*recording.notes, *notes)))
 
 
