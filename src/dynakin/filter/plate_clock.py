@@ -152,7 +152,7 @@ def _drift(
     middle, half = 0.5 * (time[0] + time[-1]), 0.5 * (time[-1] - time[0])
     delay = drift = 0.0
     for _ in range(DRIFT_PASSES):
-        there = in_step(time, led, delay + drift * (time - middle))
+        there = in_step(time, led, Delay(delay, 0.0, drift).lags(time))
         (faster, step), (variance, _), left = _step(judged, there, noise, wide, time - middle)
         delay, drift = delay + step, drift + faster
     if left > DRIFT_LEFT or abs(drift) < max(DRIFT_S / half, DRIFT_SD * float(np.sqrt(variance))):

@@ -178,7 +178,7 @@ def _known_ground(
             by_motion.append(warning("carried", carried_in_words(load_kg)))
         elif not initial.contacts and not shear.unmeasured:
             shear = found_shear(needed, total)
-            each = np.stack([initial.ground.wrench_to_ground(np.hstack([p.force, p.moment])) for p in recording.plates])
+            each = np.stack([initial.ground.wrench_to_ground(p.wrench) for p in recording.plates])
             gains = found_gains(needed, recording.plates, each, loads.total_known)
             righted = gains.righted(wrench, each)
             by_motion += [*shear.notes, *gains.notes]

@@ -97,6 +97,11 @@ class Plate:
         for key in ("force", "moment", "cop", "free_moment"):
             object.__setattr__(self, key, numbers(getattr(self, key), f"{self.name}: {key}"))
 
+    @property
+    def wrench(self) -> Array:
+        """(T, 6) [force N, moment N m about the laboratory's origin]."""
+        return np.hstack([self.force, self.moment])
+
     def frames(self, index: slice | npt.NDArray[Any]) -> Plate:
         """The same plate with only the frames of ``index``."""
         return replace(

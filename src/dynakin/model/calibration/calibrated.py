@@ -235,7 +235,7 @@ def first_centre_of_pressure(recording: Recording, ground: GroundFrame) -> Array
     plates."""
     if not recording.plates:
         return np.zeros(3)
-    plates = [np.hstack([plate.force, plate.moment]) for plate in recording.plates]
+    plates = [plate.wrench for plate in recording.plates]
     wrench = ground.wrench_to_ground(np.nansum(plates, axis=0))  # one that is dead hides no other
     on = np.flatnonzero(wrench[:, 1] > LOADED_N)
     loaded = wrench[on][recording.time[on] < recording.time[on[:1]] + 1.0]

@@ -28,7 +28,7 @@ from dynakin.model.opensim.description import (
     OpenSimModel,
     Vector,
 )
-from dynakin.model.opensim.functions import IDENTITY, Chain, Function, constant, is_constant, joined, polynomial
+from dynakin.model.opensim.functions import IDENTITY, Function, constant, is_constant, joined, polynomial
 from dynakin.model.schema import Interval, Kind
 
 Array = npt.NDArray[np.float64]
@@ -69,25 +69,15 @@ def _vector(numbers: object) -> Vector:
     return float(x), float(y), float(z)
 
 
-@dataclass(frozen=True, eq=False)
-class _Moving:
-    """An axis of a chain with its functions, whose last holds the length that it grows with."""
-
-    kind: Kind
-    direction: Array
-    coordinate: str
-    functions: Chain
-
-
 @dataclass(eq=False)
 class _Run:
     """Axes of one joint, after a turn and a place that no coordinate changes."""
 
     turn: Array = field(default_factory=lambda: np.eye(3))
     place: Array = field(default_factory=lambda: np.zeros(3))
-    moving: list[_Moving] = field(default_factory=list)
+    moving: list[JointAxis] = field(default_factory=list)
 
-    def takes(self, axis: _Moving, fixed: bool) -> bool:
+    def takes(self, axis: JointAxis, fixed: bool) -> bool:
         """Whether the axis may follow in the same joint."""
         if any(entry.kind == "rotation" for entry in self.moving) and (fixed or axis.kind == "translation"):
             return False
@@ -95,17 +85,17 @@ class _Run:
         apart = all(np.linalg.norm(np.cross(axis.direction, other)) >= _APART for other in alike)
         return fixed or (len(alike) < 3 and apart)
 
-    def add(self, axis: _Moving, fixed: bool) -> None:
+    def add(self, axis: JointAxis, fixed: bool) -> None:
         """Put the axis last. Nothing turns before one that is fixed, so that translations before it may follow it, in
         its frame."""
         if not fixed:
             self.moving.append(axis)
         elif axis.kind == "translation":
-            self.place = self.place + self.turn @ axis.direction * constant(axis.functions)
+            self.place = self.place + self.turn @ np.array(axis.direction) * constant(axis.functions)
         else:
-            turn = turned(constant(axis.functions) * axis.direction)
+            turn = turned(constant(axis.functions) * np.array(axis.direction))
             self.turn = self.turn @ turn
-            self.moving = [replace(entry, direction=turn.T @ entry.direction) for entry in self.moving]
+            self.moving = [replace(entry, direction=_vector(turn.T @ entry.direction)) for entry in self.moving]
 
 
 @dataclass
@@ -147,13 +137,13 @@ class _Tree:
         """
         runs = [_Run()]
         for axis in axes:
-            moving = _Moving(_kind(axis), np.array(axis.direction), axis.coordinate, self._functions(axis))
-            fixed = is_constant(moving.functions)
-            if fixed and constant(moving.functions) == 0.0:
+            found = JointAxis(_kind(axis), _vector(axis.direction), axis.coordinate, self._functions(axis))
+            fixed = is_constant(found.functions)
+            if fixed and constant(found.functions) == 0.0:
                 continue
-            if not runs[-1].takes(moving, fixed):
+            if not runs[-1].takes(found, fixed):
                 runs.append(_Run())
-            runs[-1].add(moving, fixed)
+            runs[-1].add(found, fixed)
         return runs
 
     def _body(self, segment: _core.SegmentSpec) -> Body:
@@ -161,12 +151,9 @@ class _Tree:
         numbers = [self.values.get(name, value) for name, value in zip(names, segment.inertia, strict=True)]
         return Body.of(segment.name, RigidBody.from_vector(numbers))
 
-    def _joint(self, name: str, parent: str, offset: Offset, child: str, moving: list[_Moving]) -> Joint:
+    def _joint(self, name: str, parent: str, offset: Offset, child: str, moving: list[JointAxis]) -> Joint:
         own: dict[str, Coordinate] = {}
-        axes = []
-        for axis in moving:
-            coordinate = self._coordinate(axis.coordinate, child, own)
-            axes.append(JointAxis(axis.kind, _vector(axis.direction), coordinate, axis.functions))
+        axes = [replace(axis, coordinate=self._coordinate(str(axis.coordinate), child, own)) for axis in moving]
         return Joint(
             name,
             "CustomJoint" if moving else "WeldJoint",

@@ -178,7 +178,7 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
 
 def _frozen(plate: Plate, time: Array) -> Flags:
     """(N,) rows of a plate that repeat the one before, while it is loaded along the axis that carries the most."""
-    rows = np.hstack([plate.force, plate.moment])
+    rows = plate.wrench
     return frozen(rows, plate.force[:, main_axis([plate])], rate_of(time) if len(time) > 1 else 1.0)
 
 
@@ -229,7 +229,7 @@ def _beyond_rows(plate: Plate, covered: Flags) -> Plate:
 
 
 def _resampled(plate: Plate, table: Table, time: Array, options: ReadOptions) -> Plate:
-    wrench = np.hstack([plate.force, plate.moment])
+    wrench = plate.wrench
     for row in np.flatnonzero(np.isnan(wrench).any(axis=1))[:1]:
         raise RecordingError(
             f"{table.path}: {plate.name} has no force at {table.time[row]:g} s, cannot be resampled or filtered"

@@ -49,7 +49,7 @@ class GroundPlate:
     @classmethod
     def of(cls, plate: Plate, ground: GroundFrame) -> GroundPlate:
         """The plate, turned to the ground frame; on the ground's own plane where its height is not known."""
-        wrench = ground.wrench_to_ground(np.hstack([plate.force, plate.moment]))
+        wrench = ground.wrench_to_ground(plate.wrench)
         known = np.asarray(np.isfinite(wrench).all(axis=1)) & ~saturated(wrench[:, 1])
         corners = None if plate.corners is None else ground.points_to_ground(plate.corners)[:, [0, 2]]
         height = surface_height(plate, ground)

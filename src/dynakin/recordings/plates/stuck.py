@@ -146,8 +146,7 @@ def vertical_only(recording: Recording) -> bool:
     """Whether no plate of a recording measures horizontal forces: they stay what they are but for noise, or the same
     part of the vertical force (of a plate that lies tilted), while that changes. A load that never changes is made up,
     and lacks nothing."""
-    total = np.nansum([np.abs(np.nan_to_num(plate.force)).sum(axis=0) for plate in recording.plates], axis=0)
-    up, changes = int(np.argmax(total)) if recording.plates else 0, False
+    up, changes = main_axis(recording.plates), False
     for plate in recording.plates:
         loaded = plate.force[np.abs(np.nan_to_num(plate.force[:, up])) > JUDGED_N]
         if not len(loaded) >= max(PRESS_S * recording.rate, 3.0):  # a rate that is NaN, too

@@ -48,7 +48,7 @@ class Replay:
             plates, _ = plates_from_table(table)
             self._plate_time = table.time
         self._plate_names = tuple(plate.name for plate in plates)
-        parts = [np.hstack([plate.force, plate.moment]) for plate in plates]
+        parts = [plate.wrench for plate in plates]
         self._wrenches: Array = np.stack(parts, axis=1) if parts else np.zeros((len(self._plate_time), 0, 6))
         self._begun_s: float | None = None
         self._frame = self._row = self._round = 0
