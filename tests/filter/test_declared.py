@@ -12,7 +12,6 @@ import pytest
 import dynakin
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.closure import Closure, closure
-from dynakin.filter.plate_sum import foot_markers
 from dynakin.filter.samples import recording_arrays
 from dynakin.messages import notes_of, warnings_of
 from dynakin.model.definition import load_model
@@ -122,7 +121,7 @@ def test_a_plate_under_the_seat_measures_it() -> None:
 def closure_of(recording: dynakin.Recording, model: dynakin.ModelDefinition) -> Closure:
     initial = dynakin.Estimator(model).calibrate(recording)
     markers, wrench = recording_arrays(recording, initial, gaps=True)
-    loads = foot_loads(recording, initial.ground, foot_markers(initial))
+    loads = foot_loads(recording, initial.ground, initial.markers_on_feet)
     found = closure(initial, recording.time, markers, wrench, loads.total_known)
     assert found is not None
     return found

@@ -19,6 +19,7 @@ from dynakin.simulation.trial import simulate_squat
 from dynakin.stream import start
 from dynakin.stream.fusion import Fusion
 from dynakin.stream.monitor import Monitor
+from dynakin.stream.plates import LivePlates
 from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
 from dynakin.stream.sinks.recorder import Recorder, recorded
@@ -296,9 +297,10 @@ def test_silent_markers_are_told_with_what_happens_then(squat: Recording) -> Non
     assert "The markers are back." in said
     _, said, live = run(Replay(squat.window(0.0, 3.0), speed=0.0))
     for holds, what in ((True, "the motion is held until they are back"), (False, "the estimate waits for them")):
-        monitor = Monitor(live.tracker.calibrated, 100.0, plates=False, used=False, holds=holds)  # type: ignore[arg-type]
+        fusion = Fusion(live.fusion.markers, None)
+        monitor = Monitor(live.tracker.calibrated, 100.0, LivePlates(live.estimator, fusion, said.append), holds)
         monitor.last = replace(monitor.last, tracking="following")
-        found = monitor.changes(Fusion(live.fusion.markers, None), 1e9)
+        found = monitor.changes(fusion, 1e9)
         assert found == [f"The markers are silent; {what}."]
         assert monitor.last.tracking == ("lost" if holds else "following")
 

@@ -196,7 +196,14 @@ def test_a_port_in_use_is_passed_over() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         assert _free_port("127.0.0.1", port) > port
-    with pytest.raises(ConfigError, match="none of 20 ports can be served"):
+    with socket.create_server(("127.0.0.1", 65535)), pytest.raises(ConfigError, match="no port from 65535 to 65535"):
+        _free_port("127.0.0.1", 65535)
+
+
+def test_an_address_of_another_computer_is_named() -> None:
+    from dynakin.stream.viewer.sink import _free_port
+
+    with pytest.raises(ConfigError, match=r"no page can be served there .*, expected an address of this computer"):
         _free_port("203.0.113.1", 8080)
 
 

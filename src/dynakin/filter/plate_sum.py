@@ -128,23 +128,6 @@ def judged_by_motion(
     return Carried(bears, undeclared, beyond, found.load_ratio, notes, reasons)
 
 
-def foot_markers(initial: CalibratedModel) -> dict[str, list[str]]:
-    """Foot -> the recording's names of the markers on its segment, and on those that hang on that (toes); none of
-    `CalibratedModel.unmarked_feet`."""
-    parents = {segment.name: segment.parent for segment in initial.spec.segments}
-
-    def on(segment: str, foot: str) -> bool:
-        return segment == foot or (segment in parents and on(parents[segment], foot))
-
-    if not initial.feet:
-        return initial.foot_markers
-    pairs = list(zip(initial.recorded_markers, initial.spec.markers, strict=True))
-    return {
-        side: [] if side in initial.unmarked_feet else [name for name, m in pairs if on(m.segment, foot)]
-        for side, foot in initial.feet.items()
-    }
-
-
 def _nearly_all(found: Closure) -> bool:
     judged = np.isfinite(found.excess[:, 1])
     return bool(np.count_nonzero(found.undeclared & judged) > _NEARLY_ALL * np.count_nonzero(judged))
@@ -172,7 +155,7 @@ def _undeclared_in_words(
 ) -> tuple[Message, Flags]:
     """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts: what they have
     too much is under a foot that stands alone (a load that somebody carries is between two)."""
-    time, feet = recording.time, foot_markers(initial)
+    time, feet = recording.time, initial.markers_on_feet
     beyond = np.zeros((len(time), len(feet)), dtype=bool)
     judged = np.isfinite(found.excess[:, 1])
     weight = initial.weighed_kg * GRAVITY_M_S2

@@ -25,7 +25,7 @@ from dynakin.filter.plate_motion import (
     turned_axes,
     wrong_rate_in_words,
 )
-from dynakin.filter.plate_sum import foot_markers, judged_by_motion
+from dynakin.filter.plate_sum import judged_by_motion
 from dynakin.filter.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear
 from dynakin.messages import Message, about, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -139,7 +139,7 @@ def _known_ground(
     # steps off the plates: their mean load is no mass
     mass = None if initial.feet else initial.weighed_kg
     steps_kg = initial.weighed_kg if initial.feet and not initial.contacts else None
-    check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads, steps_kg)
+    check = check_plates(recording, initial.ground, mass, initial.markers_on_feet, loads, steps_kg)
     if check.refusal:
         raise RecordingError(
             f"{recording.plates_file}: {check.refusal}{_how_to_give(initial, loads, check.under_no_foot)}"
@@ -212,7 +212,7 @@ def _loads_of_feet(
         check_assigned(assigned or {}, recording, ("right", "left"))
         return None
     loads = foot_loads(
-        recording, initial.ground, foot_markers(initial), assigned=assigned, others=list(initial.contacts)
+        recording, initial.ground, initial.markers_on_feet, assigned=assigned, others=list(initial.contacts)
     )
     if not initial.unmarked_feet:
         return loads

@@ -17,18 +17,19 @@ ALL_FRAMES = math.inf
 """The lag of an estimate from all frames."""
 
 
-def check_lag(lag_s: float, what: str = "lag_s") -> float:
+def check_lag(lag_s: float, what: str = "lag_s", *, live: bool = False) -> float:
     """The lag itself.
 
     Raises:
-        ConfigError: neither seconds in 0 to `LONGEST_LAG_S` nor `ALL_FRAMES`.
+        ConfigError: neither seconds in 0 to `LONGEST_LAG_S` nor, but for ``live``, `ALL_FRAMES`.
     """
     number = isinstance(lag_s, int | float) and not isinstance(lag_s, bool)
-    if number and (0.0 <= lag_s <= LONGEST_LAG_S or lag_s == ALL_FRAMES):
+    if number and (0.0 <= lag_s <= LONGEST_LAG_S or (lag_s == ALL_FRAMES and not live)):
         return float(lag_s)
+    end = "; live, not all frames are known" if live else "; or inf: all frames of a recording"
     raise ConfigError(
         f"{what} is {lag_s!r}, expected seconds (no longer frames), 0 to {LONGEST_LAG_S:g}, such as {LIVE_LAG_S:g}"
-        f"{_meant(lag_s) if number else ''}; or inf: all frames of a recording"
+        f"{_meant(lag_s) if number else ''}{end}"
     )
 
 
@@ -92,9 +93,7 @@ def live_lag(asked_s: float | None, noise: Noise) -> float:
     """
     if asked_s is None:
         return LIVE_LAG_S if can_smooth(noise) else 0.0
-    if known_lag(asked_s, noise)[0] == ALL_FRAMES:
-        raise ConfigError(f"lag_s: live, not all frames are known, expected seconds, such as {LIVE_LAG_S:g}")
-    return float(asked_s)
+    return known_lag(check_lag(asked_s, live=True), noise)[0]
 
 
 def check_can_smooth(noise: Noise) -> None:

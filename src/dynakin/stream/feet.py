@@ -31,12 +31,13 @@ from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
 from dynakin.recordings.feet.sharing import BETWEEN_M, SHORTEST_S, beside_m, lies_between, mostly
 from dynakin.recordings.feet.soles import FootShape, Soles
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate, level_pressure
+from dynakin.recordings.plates.ground_plate import GroundPlate, level_pressure
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
 from dynakin.recordings.plates.stuck import STILL_N
 from dynakin.results.naming import sentence
 from dynakin.settings.noise import Noise
 from dynakin.stream.closure import DELAY_S, LiveClosure
+from dynakin.stream.plate_samples import EndOfRange
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -100,7 +101,7 @@ class LiveFeet:
         self._beside = np.full(P, np.inf)  # since when it presses between two soles
         self._shared = np.zeros((F, P), dtype=bool)  # it has, since this foot stands and this plate is pressed
         self._owners = np.zeros((F, P), dtype=bool)  # of the plates that are pressed
-        self._range = _Range(P)
+        self._range = EndOfRange(P)
         self._closure: LiveClosure | None = None
         self.claimed = False
         """Whether in the last frame the plates carried all of the person by what feet and plates show."""
@@ -404,21 +405,3 @@ class _Belts:
         for f, found in enumerate(velocities(feet, body, time)):
             if found is not None:
                 self.velocity[f] = found
-
-
-class _Range:
-    """Whether plates are at the end of their range; afterwards it is `recordings.plates.ground_plate.saturated`."""
-
-    def __init__(self, plates: int) -> None:
-        self._top = np.full(plates, JUDGED_N)
-        self._last, self._before = np.full(plates, np.nan), np.full(plates, np.nan)
-        self._flat = np.zeros(plates, dtype=int)
-
-    def at_end(self, push: Array) -> Flags:
-        """(P,) of the next frame's vertical forces (P,) N."""
-        self._top = np.fmax(self._top, push)
-        flat = (push > self._top * (1.0 - 1e-6)) & (np.abs(push - self._last) <= 1e-6 * self._top)
-        self._before = np.where(flat, self._before, self._last)
-        self._flat = np.where(flat, self._flat + 1, 0)
-        self._last = push.copy()
-        return np.asarray((self._flat >= FLAT_FRAMES - 1) & (self._before < 0.99 * self._top))

@@ -17,6 +17,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.naming import listed
 from dynakin.results.records import NO_ESTIMATE
 from dynakin.stream.fusion import Fused, Fusion
+from dynakin.stream.plates import LivePlates
 from dynakin.stream.sinks.base import Status
 
 Array = npt.NDArray[np.float64]
@@ -30,14 +31,13 @@ class Monitor:
     """What a session's status shows, kept cheap: a step pays for some sums only.
 
     Args:
-        plates: whether there are plates. used: whether the filter takes them, for as long as it does. holds: whether it
-            holds a motion that it does not see, instead of carrying it on.
+        holds: whether the filter holds a motion that it does not see, instead of carrying it on.
     """
 
-    def __init__(self, initial: CalibratedModel, rate_hz: float, plates: bool, used: bool, holds: bool = True) -> None:
+    def __init__(self, initial: CalibratedModel, rate_hz: float, plates: LivePlates, holds: bool = True) -> None:
         self.initial, self.rate_hz = initial, rate_hz
         self.last = Status(phase="running")
-        self._plates, self.used, self._holds = plates, used, holds
+        self._plates, self._holds = plates, holds
         self._recent: deque[float] = deque()  # times of the last second's estimates
         self._late: deque[float] = deque()  # and by how much they were late, s
         kinds = [element(name).kind for name in initial.names]
@@ -73,11 +73,11 @@ class Monitor:
         """
         names, report = self.initial.recorded_markers, estimate.report
         on_plates = "none"
-        if self._plates:
+        if self._plates.there:
             self.without_plates += fused.wrenches is None
             others = "left out" if whole else "incomplete"
             plates = {"accepted": "used" if whole else "incomplete", "refused": "refused"}.get(verdicts[-1], others)
-            on_plates = "silent" if fused.wrenches is None else plates if self.used else "left out"
+            on_plates = "silent" if fused.wrenches is None else plates if self._plates.used else "left out"
         bounded, recent = self._bounded, self._recent
         within = (self._lower < state[bounded]) & (state[bounded] < self._upper)
         rows = 0 if report is None else report.n_rows
@@ -201,6 +201,6 @@ class Monitor:
     def _without_markers(self, fusion: Fusion, now_s: float) -> str:
         if self._holds:
             return "the motion is held until they are back"
-        if not self._plates or fusion.plates_silent(now_s):
+        if not self._plates.there or fusion.plates_silent(now_s):
             return "the estimate waits for them"
-        return "going on with plates alone" if self.used else "the movement is only predicted meanwhile"
+        return "going on with plates alone" if self._plates.used else "the movement is only predicted meanwhile"

@@ -10,13 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.blas import one_blas_thread
-from dynakin.errors import DivergenceError, DynakinError, ModelError, RecordingError, StreamError
+from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.plate_motion import out_of_step_in_words
 from dynakin.filter.samples import Sample
 from dynakin.filter.tracker import Tracker
-from dynakin.messages import Message, about, note, warning, warnings_of
-from dynakin.recordings.plates.stuck import frozen_live_in_words
+from dynakin.messages import Message, warning
 from dynakin.recordings.recording import Recording
 from dynakin.settings.defaults import DELAY_S
 from dynakin.settings.lag import live_lag
@@ -24,11 +22,11 @@ from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.markers import LiveMarkers
 from dynakin.stream.monitor import Monitor
-from dynakin.stream.plate_motion import LivePlateMotion
+from dynakin.stream.plates import LivePlates
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
 from dynakin.stream.sources.packets import Source
 from dynakin.stream.sources.reader import Notice, Reader
-from dynakin.stream.start import begin, check_labels, check_loaded, loaded, quietest, recording_of, stands, unknown_mass
+from dynakin.stream.start import begin, check_labels, quietest, recording_of, stands, unknown_mass
 
 Array = npt.NDArray[np.float64]
 
@@ -37,7 +35,6 @@ _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is
 _DEVIATIONS_S, _DELAYED_DEVIATIONS_S = 0.2, 1.0  # those of a lag take 0.6 steps for each of its frames
 _SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
 _CATCH_UP_S = 1.0  # with what came while the model was measured: that is left out too, but is no sign of slowness
-_CHECKED_S, _UNLOADED = 1.0, 10  # of standing on the plates, by which they are checked; so often nobody does
 _MISSING = np.full(3, np.nan)
 _MASS_KG = 70.0  # of a person of whom nothing is known, so that at least the movement is seen
 
@@ -93,14 +90,9 @@ class Live:
         self._looked = self._asked = self._sd_shown = -np.inf
         self._tracker: Tracker | None = None
         self._monitor: Monitor | None = None
-        self._use_plates = True
+        self._plates: LivePlates | None = None
         self._feet: LiveFeet | None = None
         self._own = np.zeros(0, dtype=int)  # places of the model's markers among the stream's, after the last: missing
-        self._plate_motion: LivePlateMotion | None = None
-        self._mass_doubted = False
-        self._said_frozen = 0
-        self._unloaded = 0
-        self._unchecked: deque[Fused] | None = None  # of late, while nobody has stood on the plates
         self._running = False
         self._labels_checked = False
         self._subject: dict[str, float] = {}
@@ -117,6 +109,17 @@ class Live:
         if self._fusion is None:
             raise StreamError("the session has not been opened")
         return self._fusion
+
+    @property
+    def plates(self) -> LivePlates:
+        """What is known of the plates, also where there are none.
+
+        Raises:
+            StreamError: the streams are not known yet.
+        """
+        if self._plates is None:
+            raise StreamError("the session has not been opened")
+        return self._plates
 
     @property
     def tracker(self) -> Tracker:
@@ -187,6 +190,7 @@ class Live:
         streams = self._reader.open()
         markers, plates = streams.markers, streams.plates
         self._fusion = Fusion(markers, plates, delay_s=self.delay_s)
+        self._plates = LivePlates(self.estimator, self._fusion, self.say)
         assert markers is not None
         force_plates = "no plates" if plates is None else f"{len(plates.names)} plates at {plates.rate_hz:g} Hz"
         self.say(f"Streams: {len(markers.names)} markers at {markers.rate_hz:g} Hz, {force_plates}.")
@@ -274,9 +278,7 @@ class Live:
                     self._step(fused)
             else:
                 self._stand(fused)
-        for name, since_s in self.fusion.frozen_plates[self._said_frozen :]:
-            self._said_frozen += 1
-            self.say(frozen_live_in_words(name, since_s))
+        self.plates.say_frozen()
 
     def _measured(self, fused: Fused) -> Fused:
         """A sample without markers that are no measurement."""
@@ -315,7 +317,7 @@ class Live:
         self._looked = t
         if t - self._window[0].sample.time_s < self.standing_s - 1.5 / info.rate_hz:
             return
-        plates = self.fusion.plates.names if self.fusion.plates else ()
+        plates = self.plates.names
         if not self._labels_checked:
             self.say(check_labels(self.estimator.model, recording_of(self._window, info.names, (), "the stream")))
             self._labels_checked = True
@@ -348,25 +350,21 @@ class Live:
             return
         for message in said:
             self.say(message)
-        self._mass_doubted = bool(warnings_of(about(said, "weight")))
-        self._use_plates, self._unchecked = usable is not False, deque() if usable is None else None
+        self.plates.measured(said, usable)
         self._begin_running("Ready: move.")
 
     def _begin_running(self, text: str) -> None:
         initial = self.tracker.calibrated
-        plates = self.fusion.plates is not None
-        rate, holds = self.fusion.markers.rate_hz, self.estimator.noise.recover
-        monitor = Monitor(initial, rate, plates, plates and self._use_plates, holds)
+        self.plates.begins(initial)
+        monitor = Monitor(initial, self.fusion.markers.rate_hz, self.plates, self.estimator.noise.recover)
         if self._monitor is not None:
             monitor.go_on_from(self._monitor)
         self._monitor = monitor
-        self._feet = self._plate_motion = None
+        self._feet = None
         streamed = {name: k for k, name in enumerate(self.fusion.markers.names)}
         self._own = np.array([streamed.get(name, len(streamed)) for name in initial.recorded_markers])
         if initial.feet:  # without plates too: what depends on the ground is then a prior
-            names = () if self.fusion.plates is None else self.fusion.plates.names
-            self._plate_motion = LivePlateMotion(initial, names) if plates and self._use_plates else None
-            self._feet = LiveFeet(initial, self.estimator.noise, names, self.estimator.plates)
+            self._feet = LiveFeet(initial, self.estimator.noise, self.plates.names, self.estimator.plates)
         self._running = True
         self._ready_s = time.monotonic()
         self._window.clear()
@@ -376,19 +374,18 @@ class Live:
         self.say(text)
 
     def _step(self, fused: Fused) -> None:
-        monitor, tracker = self._monitor, self.tracker
+        monitor, tracker, plates = self._monitor, self.tracker, self.plates
         assert monitor is not None
-        if self._unchecked is not None and fused.wrenches is not None:
-            self._check_plates(self._unchecked, fused)
+        plates.checked(fused)
         sample, feet, whole = fused.sample, None, True
         if self._feet is not None:
-            wrenches = fused.wrenches if self._use_plates else None
+            wrenches = fused.wrenches if plates.used else None
             markers = tracker.calibrated.ground.points_to_ground(np.vstack([fused.positions, _MISSING])[self._own])
             markers[np.array(tracker.verdicts[: len(markers)]) == "refused"] = np.nan
             feet, whole = self._feet.look(tracker.core_model, tracker.state, sample.time_s, wrenches, markers)
-            if self._plate_motion is not None and wrenches is not None:
-                self._ask_plates(self._plate_motion, sample.time_s, markers, wrenches, whole)
-        if not (whole and self._use_plates):
+            if wrenches is not None:
+                plates.moved(sample.time_s, markers, wrenches, self._feet.claimed, whole)
+        if not (whole and plates.used):
             sample = Sample(sample.time_s, sample.markers)
         try:
             estimate = tracker.step(sample, feet)
@@ -414,58 +411,6 @@ class Live:
         motion = monitor.motion(estimate, fused)
         for text in [*news, *motion, *monitor.settling(sample.time_s, state, tracker)]:
             self.say(text)
-
-    def _check_plates(self, kept: deque[Fused], fused: Fused) -> None:
-        """Plates on which nobody stood at the start are checked once somebody has for a second."""
-        kept.append(fused)
-        since = fused.sample.time_s - kept[0].sample.time_s
-        if 0.0 <= since < _CHECKED_S:
-            return
-        info, plates = self.fusion.markers, self.fusion.plates
-        assert plates is not None and self._monitor is not None
-        recording = recording_of(list(kept), info.names, plates.names)
-        kept.clear()
-        if not loaded(recording):
-            self._unloaded += 1
-            if self._unloaded == _UNLOADED:
-                self.say(
-                    note(
-                        "plates",
-                        "The plates are not checked yet: in none of the last "
-                        f"{_UNLOADED * _CHECKED_S:.0f} s have they borne somebody for half of it, as they do while "
-                        "somebody stands or walks on them. If somebody does, look at their channels and the unit of "
-                        "their forces.",
-                    )
-                )
-            return
-        self._unchecked = None
-        try:
-            said, usable = check_loaded(self.estimator, self.tracker.calibrated, recording)
-        except RecordingError as error:
-            said, usable = [warning("plates", f"{error.message}. The plates are not used any more.")], False
-        for message in said:
-            self.say(message)
-        self._mass_doubted |= bool(warnings_of(about(said, "weight")))
-        if not usable:
-            self._use_plates = self._monitor.used = False
-            self._plate_motion = None
-
-    def _ask_plates(self, asked: LivePlateMotion, time_s: float, markers: Array, wrenches: Array, whole: bool) -> None:
-        """Plates out of step are brought into it; of plates with other axes nothing is taken any more; that they carry
-        another mass is said."""
-        assert self._feet is not None and self._monitor is not None
-        if not asked.look(time_s, markers, wrenches, self._feet.claimed, whole):
-            return
-        if asked.turned is not None:
-            self.say(warning("plates", f"{asked.turned}. The plates are not used any more."))
-            self._use_plates = self._monitor.used = False
-            self._plate_motion = None
-        elif asked.delay is not None:
-            self.fusion.plates_behind_s += asked.delay.delay_s
-            self.say(f"{out_of_step_in_words(asked.delay)}; from {time_s:.2f} s on they are brought into step.")
-        if asked.mass is not None and not self._mass_doubted:
-            self._mass_doubted = True
-            self.say(asked.mass)
 
     def say(self, what: str | Message) -> None:
         """Say something to the user."""

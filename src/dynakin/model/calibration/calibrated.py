@@ -183,6 +183,23 @@ class CalibratedModel(StartingState):
         least = 2 if max((shown[name] for name in self.feet.values()), default=0) > 1 else 1
         return {side: name for side, name in self.feet.items() if shown[name] < least}
 
+    @property
+    def markers_on_feet(self) -> dict[str, list[str]]:
+        """Foot -> the recording's names of the markers on its segment, and on those that hang on that (toes); none of
+        `unmarked_feet`. Of a model fixed in the ground: ``foot_markers``."""
+        if not self.feet:
+            return self.foot_markers
+        parents = {segment.name: segment.parent for segment in self.spec.segments}
+
+        def on(segment: str, foot: str) -> bool:
+            return segment == foot or (segment in parents and on(parents[segment], foot))
+
+        pairs = list(zip(self.recorded_markers, self.spec.markers, strict=True))
+        return {
+            side: [] if side in self.unmarked_feet else [name for name, m in pairs if on(m.segment, foot)]
+            for side, foot in self.feet.items()
+        }
+
     def measured_plan(self) -> ModelPlan:
         """The plan.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib.util
 import json
 import queue
@@ -131,10 +132,16 @@ def _free_port(host: str, first: int) -> int:
         ConfigError: none of them, or an address that is not this machine's.
     """
     error: OSError | None = None
-    for port in range(first, min(first + _PORTS, 65536)):
+    ports = range(first, min(first + _PORTS, 65536))
+    for port in ports:
         try:
             with socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET):
                 return port
         except OSError as found:
+            if not isinstance(found, PermissionError) and found.errno != errno.EADDRINUSE:
+                raise ConfigError(
+                    f"--host {host}: no page can be served there ({found}), expected an address of this computer, such "
+                    "as 127.0.0.1, or 0.0.0.0 for all of them"
+                ) from found
             error = found
-    raise ConfigError(f"--host {host} --port {first}: none of {_PORTS} ports can be served ({error})")
+    raise ConfigError(f"--host {host}: no port from {first} to {ports[-1]} can be served ({error})")
