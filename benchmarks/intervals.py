@@ -34,6 +34,7 @@ from dynakin.filter.error_sizes import LANDMARKS, SCALED, Sizes, usual_sizes
 from dynakin.filter.reported_sd import BLOCKS, Parts, reported
 from dynakin.filter.systematic import Systematic
 from dynakin.model.definition import load_model
+from dynakin.recordings.times import step_of
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import MEASURED, moment_sources
 from dynakin.settings import presets
@@ -77,6 +78,7 @@ class Run:
     variance_scale: float
     moved_m: Array
     late: bool
+    step_s: float
 
 
 def runs_of(
@@ -185,6 +187,7 @@ def against(
         tracker.noise.variance_scale,
         systematic.moved_m(values_of(data, "state"))[window],
         bool(tracked.estimate.config["lag_s"]),
+        step_of(data["time"].values),
     )
 
 
@@ -213,8 +216,9 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     if sizes is not None:
         over_time = run.intensity, run.moved_m, run.sources
         said = reported(
-            sizes, run.variance_scale, run.own, run.parts, *over_time, off_plates=run.off_plates, late=run.late
-        )
+            sizes, run.variance_scale, run.own, run.parts, *over_time,
+            off_plates=run.off_plates, late=run.late, step_s=run.step_s,
+        )  # fmt: skip
     for title, block, places in groups_of(run):
         e, sd = run.error[block][:, places], said[block][:, places]
         if block == "coordinates":

@@ -17,7 +17,16 @@ from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates
 from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes, usual_sizes
 from dynakin.filter.joint_errors import SKIN_ANGLE_RAD, JointErrors
-from dynakin.filter.reported_sd import BLOCKS, OWN_AT_ONCE, OWN_LATE, STILL, movement_intensity, reported
+from dynakin.filter.reported_sd import (
+    BLOCKS,
+    OWN_AT_ONCE,
+    OWN_LATE,
+    STILL,
+    VIGOROUS_GROWS,
+    beyond_vigorous,
+    movement_intensity,
+    reported,
+)
 from dynakin.filter.systematic import _STEP_S, COMMON, ROOT_SKIN, Systematic
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
 from dynakin.settings.noise import Noise
@@ -38,7 +47,12 @@ RATE = np.array([-900.0, 4000.0, 300.0, 200.0, 100.0, 700.0])
 SIZES = (0.01, 0.02, 0.03, 0.05, 0.04, 0.06, 0.07, 0.008, 0.3, 0.015, 0.5, 0.004)
 MOVING, MOMENTS_MOVING, OFF_PLATES = 0.1, 0.05, 0.2
 NONE = Sizes(
-    *np.zeros(len(SIZES)), placed=np.inf, own_speeds=MOVING, own_moments=MOMENTS_MOVING, own_off_plates=OFF_PLATES
+    *np.zeros(len(SIZES)),
+    placed=np.inf,
+    own_speeds=MOVING,
+    own_moments=MOMENTS_MOVING,
+    vigorous=np.inf,
+    own_off_plates=OFF_PLATES,
 )
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
@@ -355,6 +369,22 @@ def test_intensity_is_the_mean_square_of_accelerations_over_their_deviations_of_
     assert movement_intensity(np.ones(3), np.zeros(3)) == 0.0
 
 
+def test_an_impact_counts_for_the_smoothed_moments_around_it() -> None:
+    intensity = np.array([10.0, 10.0, 10.0, np.nan, 10.0, 150.0, 10.0, 10.0, 10.0, 60.0])
+    found = beyond_vigorous(intensity, 50.0, 0.01)
+    np.testing.assert_allclose(found, [0.0, 0.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 0.2])
+    np.testing.assert_allclose(beyond_vigorous(np.array(150.0), 50.0, 0.01), 2.0)
+    assert (beyond_vigorous(intensity[:2], 50.0, np.nan) == 0.0).all()
+    own = {"moments": np.ones((10, 1)), "speeds": np.ones((10, 1))}
+    parts = {kind: {block: np.zeros((10, 1)) for block in own} for kind in KINDS}
+    sizes = replace(NONE, vigorous=50.0, inertia=False)
+    arguments = (np.nan_to_num(intensity, nan=10.0), np.zeros(10))
+    late, soon = (reported(sizes, 1.0, own, parts, *arguments, late=each, step_s=0.01) for each in (True, False))
+    calm = STILL + MOMENTS_MOVING * 10.0
+    np.testing.assert_allclose(late["moments"][[0, 2], 0] ** 2, [calm, calm + VIGOROUS_GROWS * 2.0])
+    assert soon["moments"][2] == soon["moments"][0] and late["speeds"][2] == late["speeds"][0]
+
+
 def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
     """Its own part times what the movement makes of it."""
     subject = Systematic(calibrated(), Noise(), replace(NONE, **dict(zip(KINDS, SIZES, strict=True))))
@@ -542,6 +572,7 @@ def test_a_skeleton_whose_markers_lie_elsewhere_has_centres_of_joints_that_are_a
     assert subject.moved_m(moved) == pytest.approx(0.012)
     assert systematic().moved_m(x) == 0.0  # no marker is looked for
     own = dict.fromkeys(BLOCKS, np.full(len(Q), 0.01)) | {"speeds": np.full(len(Q), 0.1)}
+    own |= {"accelerations": np.full(len(Q), 10.0)}
     said = [
         subject.added(own | {"moments": np.ones(len(Q))}, state, np.eye(len(x)), CONTACT[None], ["shank"], late=True)
         for state in (with_motion(x), with_motion(moved))

@@ -38,6 +38,8 @@ class Sizes:
             sure as said: of a model that was scaled worse to the person both are off, in proportion.
         own_speeds, own_moments: what the factor on the filter's own variance of smoothed speeds and moments grows by
             with the movement's intensity (`reported_sd.OWN_LATE`).
+        vigorous: intensity beyond which what is unseen of smoothed moments grows faster (`reported_sd.VIGOROUS_GROWS`):
+            walks stay below it.
         own_off_plates: part of the variance by the declared noise that counts at least, of late moments that are
             measured in a recording in which some foot stands off the plates, or in a session in which one has: what
             plates do not see they do not correct, and small innovations do not show it.
@@ -60,6 +62,7 @@ class Sizes:
     placed: float
     own_speeds: float
     own_moments: float
+    vigorous: float
     own_off_plates: float
     inertia: bool = True
 
@@ -84,6 +87,7 @@ LANDMARKS = Sizes(
     placed=np.inf,
     own_speeds=0.13,
     own_moments=0.03,
+    vigorous=33.0,
     own_off_plates=0.14,
 )
 """Joints that are found from markers on the skin."""
@@ -112,6 +116,7 @@ SCALED = Sizes(
     placed=0.005,
     own_speeds=0.06,
     own_moments=0.0,
+    vigorous=54.0,
     own_off_plates=0.034,
     inertia=False,
 )
