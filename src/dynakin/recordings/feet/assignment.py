@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import runs, widened
 from dynakin.errors import ConfigError
 from dynakin.messages import note
 from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
@@ -116,6 +116,7 @@ class _Assignment:
         self.recording, self.feet, self.contacts, self.plates, self.fixed = recording, feet, contacts, plates, fixed
         self.forward, self.sharing = forward, Sharing.of(list(contacts.values()), plates, forward, recording)
         n, F, P = recording.n_frames, len(feet), len(plates)
+        self.step = round(STEP_S * recording.rate) if n > 1 else 0  # frames
         owners = [fixed.get(plate.name) for plate in plates]
         self.given = {p: owner for p, owner in enumerate(owners) if owner is not None and owner not in feet}
         self.on = np.zeros((n, F, P), dtype=bool)  # this foot stands on this plate
@@ -206,7 +207,7 @@ class _Assignment:
                     continue
                 near = self.under[press, k, p] & foot.low[press]
                 if np.count_nonzero(near & loaded) > MOST * np.count_nonzero(loaded):
-                    self.on[press, k, p] = True
+                    self.on[press, k, p] = widened(loaded, self.step)  # not what it reads by itself
 
     def passed_on(self, p: int, plate: GroundPlate) -> None:
         """A press that two feet bear one after the other bears both as long as either of them may: the centre of
@@ -268,7 +269,7 @@ class _Assignment:
         """Frames [first, end) of each foot's stances with its setting down and leaving; all of them where nobody sees
         it, or where it never stands."""
         n, found = len(self.off), []
-        half = round(STEP_S * self.recording.rate) if n > 1 else 0
+        half = self.step
         for name in self.feet:
             foot = self.contacts.get(name)
             stances = () if foot is None else foot.stances
