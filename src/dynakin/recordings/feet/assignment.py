@@ -22,6 +22,7 @@ from dynakin.messages import note
 from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
 from dynakin.recordings.feet.findings import exchanged, plate_findings
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
+from dynakin.recordings.feet.like_the_other import like_the_other
 from dynakin.recordings.feet.loads import FootLoads, divided
 from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
@@ -61,8 +62,9 @@ def foot_loads(
     fixed = dict(assigned or {})
     check_assigned(fixed, recording, (*foot_markers, *others))
     plates = [GroundPlate.of(plate, ground) for plate in recording.plates]
-    contacts = foot_contacts(recording, ground, foot_markers, plates)
     forward = ground.vectors_to_ground(ground.forward)[[0, 2]]
+    contacts = foot_contacts(recording, ground, foot_markers, plates)
+    contacts = like_the_other(contacts, plates, forward, recording.rate)
     return _Assignment(recording, tuple(foot_markers), contacts, plates, fixed, forward).loads()
 
 
