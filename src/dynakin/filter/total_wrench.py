@@ -124,9 +124,7 @@ def _zeroed(
     if not initial.feet:
         return recording, []
     others = {plate for plate, bearer in (assigned or {}).items() if bearer in initial.contacts}
-    return without_offsets(
-        recording, initial.ground, initial.markers_on_feet, others, only_said=bool(initial.contacts)
-    )
+    return without_offsets(recording, initial.ground, initial.markers_on_feet, others, only_said=bool(initial.contacts))
 
 
 def _known_ground(

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.messages import Message, warning
 from dynakin.recordings.feet.contact import NEAR_M, FootContact
-from dynakin.recordings.feet.soles import Soles
+from dynakin.recordings.feet.soles import LONGEST_M, Soles, shape_of
 from dynakin.recordings.feet.zero_offset import MOST_OFFSET_N
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
@@ -122,7 +122,7 @@ def _off_place(
             if others or shared or with_it.mean() < TOGETHER or not _covers(foot, first, end):
                 continue
             away = distance_to_hull(plate.cop[press], foot.outline[press])[with_it]
-            if np.isfinite(away).any() and np.nanpercentile(away, 25.0) > OFF_PLACE_M:
+            if np.isfinite(away).any() and np.nanpercentile(away, 25.0) > _reach(foot, soles.rate):
                 offsets.setdefault(k, []).append((plate.cop[press] - soles.middle[press, k][:, [0, 2]])[with_it])
     if len(offsets) != 1:
         return None
@@ -134,6 +134,11 @@ def _off_place(
         f"{x:+z.2f}, Z {z:+z.2f} m of the ground frame) from the middle of the {feet[k]} foot's sole while its load "
         "comes and goes with that foot. Correct the plate's place (its corners or origin) in the file.",
     )
+
+
+def _reach(foot: FootContact, rate: float) -> float:
+    """How far (m) a foot reaches beyond its markers, at most."""
+    return LONGEST_M if shape_of(foot, np.ones(2), rate).ends is None else OFF_PLACE_M
 
 
 def _covers(foot: FootContact, first: int, end: int) -> bool:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import mean_seen, runs
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.feet.contact import filled_by_others, foot_places
 from dynakin.recordings.frame import GroundFrame
@@ -31,10 +32,10 @@ MOST_OFFSET_N = 2.0 * JUDGED_N
 NOISE_N = 3.0
 """The noise of the usual plates: what reads less is at zero."""
 CLEAR_S, CLEAR_M = 0.5, 0.3
-"""How long no marker of a foot must be near a plate, and how near is: a foot's length."""
+"""How long no foot must be near a plate, and how far (its middle) is surely not on it: its own length."""
 BLOCK_S, STEADY_N = 0.25, 5.0
-"""What a plate reads by itself varies within so long by less (standard deviation): drifts of 40 N in 3 s do by 1 N, noise
-by 3 N, a cane by 15 N."""
+"""What a plate reads by itself varies within so long by less (standard deviation): drifts of 40 N in 3 s do by 1 N,
+noise by 3 N, a cane by 15 N."""
 STEADY = 0.5
 """Part of the time without a foot in which it must be so for it to be an offset."""
 
@@ -73,7 +74,7 @@ def without_offsets(
     places = foot_places(recording, ground, foot_markers)
     if len(places) < len(foot_markers) or recording.n_frames < 2:
         return recording, []
-    feet = [filled_by_others(points)[:, :, [0, 2]] for _, points in places.values()]
+    feet = [mean_seen(filled_by_others(points)[:, :, [0, 2]], axis=1) for _, points in places.values()]
     plates, found = list(recording.plates), list[_Offset]()
     for p, plate in enumerate(plates):
         if plate.name in bearing_others:
@@ -99,25 +100,43 @@ def _offset_of(plate: GroundPlate, wrench: Array, feet: Sequence[Array], recordi
     low, middle, high = (float(value) for value in np.percentile(read[clear], (5.0, 50.0, 95.0)))
     if not NOISE_N < abs(middle) < MOST_OFFSET_N:
         return None
-    block = max(2, round(BLOCK_S * recording.rate))
-    at, means, steady = list[float](), list[Array](), 0
-    for first, end in runs(clear):
-        edges = np.linspace(first, end, max(1, (end - first) // block) + 1).astype(int)
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
-            if b - a >= block and read[a:b].std() < STEADY_N and abs(read[a:b].mean()) < MOST_OFFSET_N:
-                at.append(0.5 * float(recording.time[a] + recording.time[b - 1]))
-                means.append(wrench[a:b].mean(axis=0))
-                steady += int(b - a)
-    if steady < max(STEADY * np.count_nonzero(clear), CLEAR_S * recording.rate):
+    blocks = _steady_blocks(clear, read, max(2, round(BLOCK_S * recording.rate)))
+    time, steady = recording.time, sum(end - first for first, end in blocks)
+    enough = steady >= max(STEADY * np.count_nonzero(clear), CLEAR_S * recording.rate)
+    if not enough or _goes_on(time, read, blocks):
         return _Offset(plate.name, None, clear, low, high, middle) if abs(middle) > UNLOADED_N else None
-    levels = np.array(means)
-    drawn = np.stack([np.interp(recording.time, at, levels[:, c]) for c in range(6)], axis=1)
+    at = [0.5 * float(time[first] + time[end - 1]) for first, end in blocks]
+    levels = np.array([wrench[first:end].mean(axis=0) for first, end in blocks])
+    drawn = np.stack([np.interp(time, at, levels[:, c]) for c in range(6)], axis=1)
     return _Offset(plate.name, drawn, clear, low, high, middle)
 
 
+def _steady_blocks(clear: Flags, read: Array, length: int) -> list[tuple[int, int]]:
+    """Frames [first, end), so many and more, without a foot, in which what is read (T,) N keeps still, and is no
+    step's."""
+    found = []
+    for first, end in runs(clear):
+        edges = np.linspace(first, end, max(1, (end - first) // length) + 1).astype(int).tolist()
+        for a, b in pairwise(edges):
+            if b - a >= length and read[a:b].std() < STEADY_N and abs(read[a:b].mean()) < MOST_OFFSET_N:
+                found.append((a, b))
+    return found
+
+
+def _goes_on(time: Array, read: Array, blocks: Sequence[tuple[int, int]]) -> bool:
+    """Whether a plate drifts, and would by more than is empty until the recording's ends: nobody knows how far."""
+    at = np.concatenate([time[first:end] for first, end in blocks])
+    values = np.concatenate([read[first:end] for first, end in blocks])
+    centred = at - at.mean()
+    slope = float(centred @ values / (centred @ centred))
+    error = float(np.std(values - values.mean() - slope * centred) / np.sqrt(centred @ centred))
+    beyond = max(float(at.min() - time[0]), float(time[-1] - at.max()))
+    return abs(slope) > 3.0 * error and abs(slope) * beyond > UNLOADED_N
+
+
 def _clear(plate: GroundPlate, feet: Sequence[Array]) -> Flags:
-    """(T,) frames in which every foot (T, K, 2) m is seen, and none of its markers near the plate; all of a plate that
-    nobody is ever on."""
+    """(T,) frames in which every foot, its middle (T, 2) m, is seen and not near the plate; all of a plate that nobody
+    is ever on."""
     clear = plate.known.copy()
     place = plate.corners
     if place is None:
@@ -126,27 +145,22 @@ def _clear(plate: GroundPlate, feet: Sequence[Array]) -> Flags:
             return clear
         (x0, z0), (x1, z1) = np.percentile(judged, (5.0, 95.0), axis=0)
         place = np.array([[x0, z0], [x1, z0], [x1, z1], [x0, z1]])
-    for points in feet:
-        flat = points.reshape(-1, 2)
-        away = distance_to_hull(flat, np.broadcast_to(place, (len(flat), *place.shape))).reshape(points.shape[:2])
-        clear &= np.nan_to_num(away, nan=np.inf).min(axis=1) > CLEAR_M
-        clear &= np.isfinite(away).any(axis=1)
+    for middle in feet:
+        away = distance_to_hull(middle, np.broadcast_to(place, (len(middle), *place.shape)))
+        clear &= np.nan_to_num(away, nan=0.0) > CLEAR_M
     return clear
 
 
 def _taken_in_words(taken: Sequence[_Offset]) -> Message:
-    parts = ", ".join(f"{offset.name} ({offset.words()})" for offset in taken)
-    text = (
-        f"Zero offset: while no foot is near, {parts} {'reads' if len(taken) == 1 else 'read'} this load of nobody's, "
-        "which is taken off over the whole trial. Zero the plates before a trial."
-    )
-    return (warning if any(abs(offset.middle_n) > UNLOADED_N for offset in taken) else note)("plates", text)
+    parts = ", ".join(f"{offset.name} reads {offset.words()}" for offset in taken)
+    text = f"While no foot is near, {parts}: it is taken off over the whole trial."
+    return (warning if any(abs(offset.middle_n) > UNLOADED_N for offset in taken) else note)("zero", text)
 
 
 def _left_in_words(left: Sequence[_Offset], time: Array) -> list[Message]:
     return [
         warning(
-            "plates",
+            "zero",
             f"{offset.name} reads {offset.low_n:.0f} to {offset.high_n:.0f} N while no foot is near it, between "
             f"{time[offset.clear][0]:.2f} and {time[offset.clear][-1]:.2f} s: zero it before the trial, or take it off "
             "with plate_loads.",
