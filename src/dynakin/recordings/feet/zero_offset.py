@@ -36,6 +36,9 @@ CLEAR_S, CLEAR_M = 0.5, 0.3
 BLOCK_S, STEADY_N = 0.25, 5.0
 """What a plate reads by itself varies within so long by less (standard deviation): drifts of 40 N in 3 s do by 1 N,
 noise by 3 N, a cane by 15 N."""
+NOBODYS = 0.1
+"""Part of what the plates carry together at most that a plate without edges reads if nobody is ever on it: in another
+unit (N per kg, % of the weight) all of them may read so little."""
 STEADY = 0.5
 """Part of the time without a foot in which it must be so for it to be an offset."""
 
@@ -76,10 +79,13 @@ def without_offsets(
         return recording, []
     feet = [mean_seen(filled_by_others(points)[:, :, [0, 2]], axis=1) for _, points in places.values()]
     plates, found = list(recording.plates), list[_Offset]()
+    on_ground = [GroundPlate.of(plate, ground) for plate in plates]
+    most = np.max(np.sum([plate.push for plate in on_ground], axis=0), initial=0.0)
     for p, plate in enumerate(plates):
         if plate.name in bearing_others:
             continue
-        offset = _offset_of(GroundPlate.of(plate, ground), plate.wrench, feet, recording)
+        clear = _clear(on_ground[p], feet, NOBODYS * float(most))
+        offset = _offset_of(on_ground[p], plate.wrench, clear, recording)
         if offset is None:
             continue
         found.append(offset)
@@ -92,8 +98,7 @@ def without_offsets(
     return recording.with_plates(tuple(plates)), [_taken_in_words(taken), *said]
 
 
-def _offset_of(plate: GroundPlate, wrench: Array, feet: Sequence[Array], recording: Recording) -> _Offset | None:
-    clear = _clear(plate, feet)
+def _offset_of(plate: GroundPlate, wrench: Array, clear: Flags, recording: Recording) -> _Offset | None:
     if np.count_nonzero(clear) < CLEAR_S * recording.rate:
         return None
     read = plate.wrench[:, 1]
@@ -134,15 +139,15 @@ def _goes_on(time: Array, read: Array, blocks: Sequence[tuple[int, int]]) -> boo
     return abs(slope) > 3.0 * error and abs(slope) * beyond > UNLOADED_N
 
 
-def _clear(plate: GroundPlate, feet: Sequence[Array]) -> Flags:
-    """(T,) frames in which every foot, its middle (T, 2) m, is seen and not near the plate; all of a plate that nobody
-    is ever on."""
+def _clear(plate: GroundPlate, feet: Sequence[Array], nobodys_n: float) -> Flags:
+    """(T,) frames in which every foot, its middle (T, 2) m, is seen and not near the plate; all of a plate
+    without edges that nobody is ever on: it reads no more than ``nobodys_n``."""
     clear = plate.known.copy()
     place = plate.corners
     if place is None:
         judged = plate.cop[(plate.push > JUDGED_N) & np.isfinite(plate.cop).all(axis=1)]
         if not len(judged):
-            return clear
+            return np.asarray(clear & (plate.push.max() < nobodys_n))
         (x0, z0), (x1, z1) = np.percentile(judged, (5.0, 95.0), axis=0)
         place = np.array([[x0, z0], [x1, z0], [x1, z1], [x0, z1]])
     for middle in feet:
