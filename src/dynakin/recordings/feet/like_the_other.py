@@ -26,7 +26,8 @@ of nine real persons', 0.027 of six simulated ones (`truth3d`)."""
 REACHES_M = 0.05
 """How far beyond a foot's other markers one must lie to be missed."""
 SOONER_S = 0.15
-"""How long a foot may bear load on a part that has no marker (a heel that sets down) before and after one that has."""
+"""How long a foot may bear load on a part that has no marker (a heel that sets down) before and after one that
+has (chosen on walks of seeds 1 to 3 of `truth3d`, judged on 4)."""
 _MOST = 6  # markers of a foot: more show it whole, and the ways to pair them are too many
 
 
