@@ -21,7 +21,7 @@ Topic = Literal[
     "place",  # plates that press beside where the movement needs them to
     "rate",  # movement and forces that do not fit each other's times
     "weight",  # plates beside the mass
-    "zero",  # plates that push sideways all the time
+    "zero",  # plates that read something with nobody on them, or push sideways all the time
     "gain",  # plates whose forces are too large or small
     "vertical only",  # plates that measure no horizontal force
     "carried",  # what is in the hands

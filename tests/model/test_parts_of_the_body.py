@@ -143,6 +143,14 @@ def test_a_static_recording_of_another_person_is_doubted() -> None:
         assert len(said) == doubted and all(text.startswith("Warning: distances between markers") for text in said)
 
 
+def test_a_marker_of_a_foot_that_only_the_standing_trial_has_is_named() -> None:
+    own = standing()
+    heel = next(name for name in own.marker_names if name.startswith("R") and "HEE" in name)
+    said = [str(message) for message in definition().calibrate(unseen(own, heel), static=own).messages]
+    assert sum(f"{heel} of the right foot is in " in text for text in said) == 1
+    assert not any(" foot is in " in str(message) for message in definition().calibrate(own, static=own).messages)
+
+
 def test_too_little_of_the_pelvis_is_refused_in_words() -> None:
     pelvis = ["LASI", "RASI", "LPSI", "RPSI"]
     with pytest.raises(ModelError, match=r"segment 'pelvis' .* has 0 of the landmarks .*hip_r.*expected 2 or more"):

@@ -12,21 +12,22 @@ from dynakin import read
 from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.loads import SWING, UNKNOWN
+from dynakin.recordings.feet.zero_offset import without_offsets
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
 from support.made_steps import FOOT_MARKERS, LABORATORY, Made, MadePlate, Stance, lasting, steps, walk
 
 
-def walked(length: float = 0.6, **changes: object) -> Made:
-    """Four steps over four plates; the second one is changed."""
-    feet = walk(4, length)
+def walked(length: float = 0.6, count: int = 4, changed: str = "p1", **changes: object) -> Made:
+    """Steps over as many plates; one is changed."""
+    feet = walk(count, length)
     plates = []
     for side in ("right", "left"):
         for s in feet[side]:
             plate = MadePlate(s.plates[0], (s.x - 0.25, s.x + 0.25), (s.z - 0.2, s.z + 0.2))
-            plates.append(replace(plate, **changes) if plate.name == "p1" else plate)
-    return steps(lasting(4), feet, plates)
+            plates.append(replace(plate, **changes) if plate.name == changed else plate)
+    return steps(lasting(count), feet, plates)
 
 
 def messages(recording: Recording) -> list[str]:
@@ -81,21 +82,108 @@ def test_a_plate_off_its_place_is_said_with_its_offset(x: float, z: float) -> No
     assert np.isnan(loads.wrench[on, 1]).all() or abs(z) < 0.2
 
 
+def zeroed(recording: Recording) -> tuple[Recording, list[str]]:
+    found, said = without_offsets(recording, LABORATORY, FOOT_MARKERS)
+    return found, list(map(str, said))
+
+
 @pytest.mark.parametrize("drift_n", [25.0, -40.0, 45.0])
-def test_a_drift_is_said_and_bears_nobody(drift_n: float) -> None:
+def test_a_drift_of_unknown_size_is_said_and_bears_nobody(drift_n: float) -> None:
+    """No foot is far from the plate but at the end."""
     made = walked(drift_n=drift_n)
-    said = [t for t in messages(made.recording) if "while no foot is near it" in t]
-    assert len(said) == 1 and said[0].startswith("Warning: p1 reads") and "plate_loads" in said[0]
+    recording, said = zeroed(made.recording)
+    assert recording is made.recording and len(said) == 1
+    assert said[0].startswith("Warning: p1 reads") and "plate_loads" in said[0]
     loads = foot_loads(made.recording, LABORATORY, FOOT_MARKERS)
     swings = (made.push[:, 1] == 0.0) & loads.aloft[:, 1] & (loads.reason[:, 1] != UNKNOWN)
     assert swings.any() and (loads.reason[swings, 1] == SWING).all()
+
+
+@pytest.mark.parametrize("drift_n", [-40.0, 45.0, 90.0])
+def test_a_drift_that_is_seen_before_and_after_a_step_is_taken_off(drift_n: float) -> None:
+    made, still = (walked(0.6, 7, "p3", drift_n=drift) for drift in (drift_n, 0.0))
+    recording, said = zeroed(made.recording)
+    assert len(said) == 1 and said[0].startswith("Warning: While no foot is near, p3 reads")
+    forces = [next(plate.force for plate in each.plates if plate.name == "p3") for each in (recording, still.recording)]
+    np.testing.assert_allclose(*forces, atol=0.05 * abs(drift_n))
+    loads = foot_loads(recording, LABORATORY, FOOT_MARKERS)
+    assert loads.all_measured.all() and zeroed(recording)[0] is recording
+
+
+def with_read(recording: Recording, name: str, newton: np.ndarray, *, alone: bool = False) -> Recording:
+    """With so much more (T,) N read by a plate, at its middle; alone: nothing else."""
+    plates = list(recording.plates)
+    k = next(k for k, plate in enumerate(plates) if plate.name == name)
+    force = np.outer(newton, [0.0, 1.0, 0.0])
+    points = plates[k].cop if plates[k].corners is None else plates[k].corners
+    assert points is not None
+    middle = np.nanmean(points, axis=0)
+    wrench = (0.0 if alone else plates[k].wrench) + np.hstack([force, np.cross(middle, force)])
+    plates[k] = plate_from_wrench(
+        name,
+        wrench[:, :3],
+        wrench[:, 3:],
+        Surface(middle, np.array([0.0, 1.0, 0.0])),
+        corners=plates[k].corners,
+        threshold_n=10.0,
+        zero_unloaded=False,
+    )
+    return recording.with_plates(tuple(plates))
+
+
+def test_an_offset_of_a_plate_that_nobody_steps_on_is_taken_off_without_its_edges() -> None:
+    made = walked().recording
+    idle = with_read(made, "p0", 15.0 + 0.3 * np.sin(np.arange(made.n_frames)), alone=True)
+    idle = idle.with_plates(tuple(replace(plate, corners=None) for plate in idle.plates))
+    found, said = zeroed(idle)
+    assert len(said) == 1 and "p0 reads 15 N" in said[0]
+    assert np.abs(next(plate.force for plate in found.plates if plate.name == "p0")).max() < 1.0
+
+
+def test_what_changes_while_no_foot_is_near_is_said_and_stays() -> None:
+    """A cane on a plate that the feet have left."""
+    made = walked().recording
+    cane = with_read(made, "p3", 30.0 + 25.0 * np.sin(12.0 * made.time), alone=True)
+    found, said = zeroed(cane)
+    assert found is cane and len(said) == 1
+    assert said[0].startswith("Warning: p3 reads") and "plate_loads" in said[0]
 
 
 def test_a_drift_beyond_what_is_judged_shows_no_place() -> None:
     """It rises above it while the last foot stands beside the plates, as if it came with that."""
     made = walked(drift_n=70.0).recording
     said = messages(made.with_plates(tuple(plate for plate in made.plates if plate.name != "p3")))
-    assert any("while no foot is near it" in t for t in said) and not any("off its place" in t for t in said)
+    assert not any("off its place" in t for t in said)
+
+
+def test_an_offset_is_not_the_foots_that_steps_on_its_plate_last() -> None:
+    """Two frames of a foot that sets down as a recording ends say nothing of what was read before."""
+    made = walked().recording
+    recording = with_read(made, "p3", np.full(made.n_frames, 15.0)).window(0.0, 1.67)
+    on = foot_loads(recording, LABORATORY, FOOT_MARKERS).on.any(axis=1)  # (T, P)
+    p = [plate.name for plate in recording.plates].index("p3")
+    assert on[-1, p] and not on[recording.time < 1.4, p].any()
+
+
+@pytest.mark.parametrize("lost", ["RHEE", "LTOE"])
+@pytest.mark.parametrize("edges", [True, False])
+def test_a_foot_without_a_marker_reaches_as_far_as_the_other(lost: str, edges: bool) -> None:
+    made = walked(edges=edges)
+    markers = made.recording.markers.copy()
+    markers[:, made.recording.marker_names.index(lost)] = np.nan
+    recording = replace(made.recording, markers=markers)
+    assert messages(recording) == []
+    loads = foot_loads(recording, LABORATORY, FOOT_MARKERS)
+    assert loads.all_measured.all()
+    np.testing.assert_allclose(loads.wrench[..., 1], made.push, atol=5.0)
+
+
+def test_a_foot_whose_length_is_not_seen_accuses_no_plate() -> None:
+    made = walked().recording
+    markers = made.markers.copy()
+    for name in ("RHEE", "LHEE"):
+        markers[:, made.marker_names.index(name)] = np.nan
+    assert not any("off its place" in t for t in messages(replace(made, markers=markers)))
 
 
 def test_a_plate_that_reads_nothing_under_a_foot_is_dead() -> None:
@@ -108,8 +196,9 @@ def test_a_plate_that_reads_nothing_under_a_foot_is_dead() -> None:
     assert not any("reads nothing" in t for t in messages(made))
 
 
-def test_a_drift_below_the_noise_is_not_said() -> None:
-    assert messages(walked(drift_n=8.0).recording) == []
+def test_a_drift_below_the_noise_is_no_warning() -> None:
+    _, said = zeroed(walked(drift_n=8.0).recording)
+    assert not any(t.startswith("Warning") for t in said)
 
 
 def test_exchanged_plates_under_feet_that_stand_are_no_ones_business_here() -> None:

@@ -33,6 +33,7 @@ from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.assignment import check_assigned, foot_loads
 from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.feet.zero_offset import without_offsets
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.pressure import LOADED_N
@@ -99,7 +100,11 @@ def known_ground(
     Raises:
         RecordingError: the plates are refused.
     """
+    zeroed, said = _zeroed(recording, initial, assigned)
+    if zeroed is not recording:
+        recording, wrench = zeroed, initial.ground.wrench_to_ground(zeroed.total_wrench())
     ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance)
+    ground = replace(ground, notes=(*said, *ground.notes))
     left = None
     if ground.loads is not None:
         left = clock_delay(initial, recording.time, markers, known, drifts=not about(ground.notes, "carried"))
@@ -108,7 +113,18 @@ def known_ground(
     if left is None or not left.worth_it:  # the coarse search's deviation gives way to the finer one's
         return (replace(ground, clock_sd_s=left.sd_s) if left is not None and ground.behind_s else ground), known
     delay = left._replace(delay_s=ground.behind_s + left.delay_s)
-    return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
+    ground, known = _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
+    return replace(ground, notes=(*said, *ground.notes)), known
+
+
+def _zeroed(
+    recording: Recording, initial: CalibratedModel, assigned: Mapping[str, str] | None
+) -> tuple[Recording, list[Message]]:
+    """The recording without what its plates read while nobody is on them, with sentences on it."""
+    if not initial.feet:
+        return recording, []
+    others = {plate for plate, bearer in (assigned or {}).items() if bearer in initial.contacts}
+    return without_offsets(recording, initial.ground, initial.markers_on_feet, others, only_said=bool(initial.contacts))
 
 
 def _known_ground(

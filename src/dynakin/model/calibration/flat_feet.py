@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from dynakin.messages import Message, warning
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.sites import Candidate
@@ -38,6 +38,26 @@ def flat_slopes(trial: Trial) -> dict[str, float]:
         if flat.any():
             heel, toe = (trial.ground.points_to_ground(trial.recording.marker(n)) for n in own[side])
             found[side] = float(np.median(slope((toe - heel)[flat])))
+    return found
+
+
+def lost_on_feet(trial: Trial, standing: Trial) -> list[Message]:
+    """Sentences on markers of a foot that the standing trial has and the trial has not: they end its sole."""
+    found = []
+    for side, names in standing.match.foot_markers.items():
+        lost = [name for key, name in standing.match.names.items() if name in names and key not in trial.match.names]
+        if not lost:
+            continue
+        other = len(trial.match.foot_markers["left" if side == "right" else "right"])
+        known = len(trial.match.foot_markers[side]) < other
+        how = "as far as by the other foot" if known else "no further than its other markers"
+        found.append(
+            note(
+                "calibration",
+                f"{listed(lost)} of the {side} foot {'are' if len(lost) > 1 else 'is'} in {standing.recording.name}, "
+                f"not in {trial.recording.name}: on a plate the foot reaches {how}.",
+            )
+        )
     return found
 
 

@@ -23,7 +23,7 @@ from dynakin.model.calibration.checks import (
     unmeasured_lengths,
 )
 from dynakin.model.calibration.completion import Completed, completed
-from dynakin.model.calibration.flat_feet import flat_slopes, never_flat, raised_heels, usual_slopes
+from dynakin.model.calibration.flat_feet import flat_slopes, lost_on_feet, never_flat, raised_heels, usual_slopes
 from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmark_markers import in_both, needed_markers, seen_together, table_markers
@@ -248,6 +248,7 @@ def _matched(asked: Asked, messages: list[Message]) -> _Trials:
         )
     source = Trial.of(static, stands.match, asked.find_ground(static, stands.match))
     source = source.facing() if model.floating else source
+    messages += lost_on_feet(trial, source) if model.sided else []
     if other := another_person(recording, static):
         messages.append(warning("calibration", f"{other}. Lengths and marker places are those of {static.name}."))
     return _Trials(as_asked, trial, source, side)

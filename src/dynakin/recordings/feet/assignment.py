@@ -16,12 +16,13 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import runs, widened
 from dynakin.errors import ConfigError
 from dynakin.messages import note
 from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
 from dynakin.recordings.feet.findings import exchanged, plate_findings
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
+from dynakin.recordings.feet.like_the_other import like_the_other
 from dynakin.recordings.feet.loads import FootLoads, divided
 from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
@@ -61,8 +62,9 @@ def foot_loads(
     fixed = dict(assigned or {})
     check_assigned(fixed, recording, (*foot_markers, *others))
     plates = [GroundPlate.of(plate, ground) for plate in recording.plates]
-    contacts = foot_contacts(recording, ground, foot_markers, plates)
     forward = ground.vectors_to_ground(ground.forward)[[0, 2]]
+    contacts = foot_contacts(recording, ground, foot_markers, plates)
+    contacts = like_the_other(contacts, plates, forward, recording.rate)
     return _Assignment(recording, tuple(foot_markers), contacts, plates, fixed, forward).loads()
 
 
@@ -116,6 +118,7 @@ class _Assignment:
         self.recording, self.feet, self.contacts, self.plates, self.fixed = recording, feet, contacts, plates, fixed
         self.forward, self.sharing = forward, Sharing.of(list(contacts.values()), plates, forward, recording)
         n, F, P = recording.n_frames, len(feet), len(plates)
+        self.step = round(STEP_S * recording.rate) if n > 1 else 0  # frames
         owners = [fixed.get(plate.name) for plate in plates]
         self.given = {p: owner for p, owner in enumerate(owners) if owner is not None and owner not in feet}
         self.on = np.zeros((n, F, P), dtype=bool)  # this foot stands on this plate
@@ -206,7 +209,7 @@ class _Assignment:
                     continue
                 near = self.under[press, k, p] & foot.low[press]
                 if np.count_nonzero(near & loaded) > MOST * np.count_nonzero(loaded):
-                    self.on[press, k, p] = True
+                    self.on[press, k, p] = widened(loaded, self.step)  # not what it reads by itself
 
     def passed_on(self, p: int, plate: GroundPlate) -> None:
         """A press that two feet bear one after the other bears both as long as either of them may: the centre of
@@ -268,7 +271,7 @@ class _Assignment:
         """Frames [first, end) of each foot's stances with its setting down and leaving; all of them where nobody sees
         it, or where it never stands."""
         n, found = len(self.off), []
-        half = round(STEP_S * self.recording.rate) if n > 1 else 0
+        half = self.step
         for name in self.feet:
             foot = self.contacts.get(name)
             stances = () if foot is None else foot.stances

@@ -1,4 +1,4 @@
-"""What is wrong with plates that only the feet show: one off its place, two exchanged, one that drifts, a dead one.
+"""What is wrong with plates that only the feet show: one off its place, two exchanged, a dead one.
 
 Each is said in one sentence, with what to do. Nothing is put right here: a load that lies under no foot is left out.
 """
@@ -14,12 +14,13 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.messages import Message, warning
 from dynakin.recordings.feet.contact import NEAR_M, FootContact
-from dynakin.recordings.feet.soles import Soles
+from dynakin.recordings.feet.soles import LONGEST_M, Soles, shape_of
+from dynakin.recordings.feet.zero_offset import MOST_OFFSET_N
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Array
-from dynakin.recordings.times import span, step_of
+from dynakin.recordings.times import span
 
 Flags = npt.NDArray[np.bool_]
 
@@ -30,16 +31,9 @@ TOGETHER = 0.7
 """Part of a press in which a foot must stand, and the other way round, for the two to belong together."""
 FITS, MISFITS = 0.8, 0.3
 """Part of a plate's load that must lie under feet once plates are exchanged, and may at most before."""
-MOST_DRIFT_N = 2.0 * JUDGED_N
-"""What a plate reads beside the load, at most: a press that stays below it may be nobody's, and shows no place."""
-CLEAR_S = 0.5
-"""How long no foot must be near a plate for a drift to be said."""
 STANDS_S = 0.5
 """How long a foot must stand on a plate that reads nothing for it to be said: one that hovers over it in a functional
 trial does for a quarter of a second."""
-CLEAR_M = 0.3
-"""How far a foot must be from a plate to be surely not on it: its own length."""
-
 Contacts = Sequence[FootContact | None]
 
 
@@ -65,8 +59,6 @@ def plate_findings(
     ]
     for p, plate in enumerate(plates):
         if not any(p in pair for pair in swapped) and (text := _off_place(plate, feet, contacts, soles, on, p)):
-            said.append(text)
-        if text := _drift(time, plate, soles, on[:, :, p]):
             said.append(text)
         if text := _dead(time, plate, feet, contacts, on):
             said.append(text)
@@ -119,7 +111,7 @@ def _off_place(
     offsets: dict[int, list[Array]] = {}
     for first, end in runs(plate.push > JUDGED_N):
         press = slice(first, end)
-        if plate.push[press].max() < MOST_DRIFT_N:
+        if plate.push[press].max() < MOST_OFFSET_N:
             continue
         for k, foot in enumerate(contacts):
             assert foot is not None
@@ -130,7 +122,7 @@ def _off_place(
             if others or shared or with_it.mean() < TOGETHER or not _covers(foot, first, end):
                 continue
             away = distance_to_hull(plate.cop[press], foot.outline[press])[with_it]
-            if np.isfinite(away).any() and np.nanpercentile(away, 25.0) > OFF_PLACE_M:
+            if np.isfinite(away).any() and np.nanpercentile(away, 25.0) > _reach(foot, soles.rate):
                 offsets.setdefault(k, []).append((plate.cop[press] - soles.middle[press, k][:, [0, 2]])[with_it])
     if len(offsets) != 1:
         return None
@@ -144,37 +136,16 @@ def _off_place(
     )
 
 
+def _reach(foot: FootContact, rate: float) -> float:
+    """How far (m) a foot reaches beyond its markers, at most."""
+    return LONGEST_M if shape_of(foot, np.ones(2), rate).ends is None else OFF_PLACE_M
+
+
 def _covers(foot: FootContact, first: int, end: int) -> bool:
     """Whether one stance of a foot goes on for about as long as a press."""
     inside = [min(b, end) - max(a, first) for a, b in foot.stances if min(b, end) > max(a, first)]
     lengths = [b - a for a, b in foot.stances if min(b, end) > max(a, first)]
     return bool(inside) and max(inside) > TOGETHER * max(lengths)
-
-
-def _drift(time: Array, plate: GroundPlate, soles: Soles, owners: Flags) -> Message | None:
-    """Whether a plate reads something while no foot is near it."""
-    place = plate.corners if plate.corners is not None else _pressed_at(plate)
-    if place is None:
-        return None
-    away = np.stack(
-        [
-            distance_to_hull(soles.middle[:, k][:, [0, 2]], np.broadcast_to(place, (len(time), *place.shape)))
-            for k in range(owners.shape[1])
-        ],
-        axis=1,
-    )
-    clear = (np.nan_to_num(away, nan=0.0) > CLEAR_M).all(axis=1) & plate.known
-    if len(time) < 2 or np.count_nonzero(clear) * step_of(time) < CLEAR_S:
-        return None
-    read = plate.wrench[clear, 1]
-    low, middle, high = np.percentile(read, (5.0, 50.0, 95.0))
-    if not UNLOADED_N < abs(middle) < MOST_DRIFT_N:
-        return None
-    return warning(
-        "plates",
-        f"{plate.name} reads {low:.0f} to {high:.0f} N while no foot is near it, between {time[clear][0]:.2f} "
-        f"and {time[clear][-1]:.2f} s: zero it before the trial, or take it off with plate_loads.",
-    )
 
 
 def _dead(time: Array, plate: GroundPlate, feet: Sequence[str], contacts: Contacts, on: Flags) -> Message | None:
@@ -197,13 +168,3 @@ def _dead(time: Array, plate: GroundPlate, feet: Sequence[str], contacts: Contac
                     "it out of the file if not.",
                 )
     return None
-
-
-def _pressed_at(plate: GroundPlate) -> Array | None:
-    """(K, 2) the corners of what its centres of pressure span; None of a plate that is never loaded."""
-    judged = plate.cop[plate.push > JUDGED_N]
-    judged = judged[np.isfinite(judged).all(axis=1)]
-    if not len(judged):
-        return None
-    (x0, z0), (x1, z1) = np.percentile(judged, (5.0, 95.0), axis=0)
-    return np.array([[x0, z0], [x1, z0], [x1, z1], [x0, z1]])

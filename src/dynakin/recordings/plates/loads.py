@@ -52,10 +52,14 @@ def without_plate_loads(recording: Recording, loads: Sequence[PlateLoad], vertic
 def _relieved(plate: Plate, loads: Sequence[PlateLoad], up: Array) -> Plate:
     if not loads:
         return plate
-    force, moment = plate.force.copy(), plate.moment.copy()
-    for load in loads:
-        force -= load.force_n
-        moment -= np.cross(load.point_m, load.force_n) + load.moment_nm
+    force = np.sum([load.force_n for load in loads], axis=0)
+    moment = np.sum([np.cross(load.point_m, load.force_n) + load.moment_nm for load in loads], axis=0)
+    return without_wrench(plate, np.concatenate([force, moment]), up)
+
+
+def without_wrench(plate: Plate, wrench: Array, up: Array) -> Plate:
+    """The plate without a wrench (6,) or (T, 6) N and N m about the laboratory's origin; its normal is ``up`` (3,)."""
+    force, moment = plate.force - wrench[..., :3], plate.moment - wrench[..., 3:]
     points = plate.cop if plate.corners is None else plate.corners
     seen = points[np.isfinite(points).all(axis=1)]
     surface = Surface(np.median(seen, axis=0) if len(seen) else np.zeros(3), up)
