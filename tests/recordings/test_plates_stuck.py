@@ -104,7 +104,8 @@ INCLINED = tuple(
     pressed("inclined", step(at).force[:, [1]] * [0.03, 1.0, 0.0], np.nan_to_num(step(at).cop)) for at in (0.2, 0.9)
 )
 INWARDS = tuple(
-    pressed("inwards", step(0.2).force[:, [1]] * [0.0, 1.0, part], np.nan_to_num(step(0.2).cop)) for part in (-0.08, 0.08)
+    pressed("inwards", step(0.2).force[:, [1]] * [0.0, 1.0, part], np.nan_to_num(step(0.2).cop))
+    for part in (-0.08, 0.08)
 )
 
 
