@@ -21,7 +21,7 @@ Flags = npt.NDArray[np.bool_]
 LACKS = 0.03
 """Part of the weight that plates may lack under a foot that bears nothing; the part of a movement is taken off by how
 fast the markers rise. Pirouettes, a throw and a kick (simulated, one seed), which chose, lack -0.02 to 0.02; of others
-a foot that hovers in `functional` 0.00 to 0.04, steps off the plates (17, real and simulated) 0.35 to 1."""
+a foot that hovers in `functional` 0.00 to 0.04, steps off the plates (12, real and simulated) 0.35 to 1."""
 SHOWN_S, LEAST_S = 0.5, 0.2
 """How long the plates must bear the person for their load to be the weight, and a foot must rest for it to be judged:
 the markers' rise is known to some cm/s."""
