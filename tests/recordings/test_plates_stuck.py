@@ -103,6 +103,10 @@ def noisy(plate: Plate, sd_n: float) -> Plate:
 INCLINED = tuple(
     pressed("inclined", step(at).force[:, [1]] * [0.03, 1.0, 0.0], np.nan_to_num(step(at).cop)) for at in (0.2, 0.9)
 )
+INWARDS = tuple(
+    pressed("inwards", step(0.2).force[:, [1]] * [0.0, 1.0, part], np.nan_to_num(step(0.2).cop))
+    for part in (-0.08, 0.08)
+)
 
 
 @pytest.mark.parametrize(
@@ -111,6 +115,7 @@ INCLINED = tuple(
         ((noisy(step(0.2), 1.0), noisy(GOOD, 1.0)), True),
         ((noisy(step(0.2), 8.0), noisy(GOOD, 8.0)), False),
         (INCLINED, True),
+        (INWARDS, False),  # hops of two legs
         (tuple(edited(step(at), force={0: 0.0, 2: 0.0}) for at in (0.2, 0.9)), True),
         (tuple(edited(step(at), force={0: 2.0, 2: -1.0}) for at in (0.2, 0.9)), True),  # an amplifier's zero
         ((tilted(step(0.2)), tilted(GOOD)), True),

@@ -16,14 +16,18 @@ from dynakin.recordings.plates.ground_plate import GroundPlate
 from support.made_steps import (
     FOOT_MARKERS,
     LABORATORY,
+    ON_ONE_LEG,
     RATE_HZ,
+    TWO_PLATES,
     WEIGHT_N,
     Made,
     MadePlate,
     Stance,
     lasting,
+    moved,
     sliding_in,
     steps,
+    turning,
     walk,
 )
 
@@ -151,6 +155,35 @@ def test_a_box_that_no_plate_measures_bears_a_foot_that_alone_can_and_a_foot_hel
     loads = found(made)
     assert (loads.reason[time > 1.3, 0] == SWING).all() and loads.total_known.all()
     assert not loads.soles.bears[time > 1.3, 0].any()
+
+
+def test_a_foot_that_hovers_beside_the_plates_bears_nothing_while_these_bear_the_person() -> None:
+    """It keeps 10 mm from the floor behind the person; one that sets down there bears a half."""
+    made = steps(4.0, ON_ONE_LEG, TWO_PLATES)
+    time = made.recording.time
+    to = np.where(time[:, None] > 1.4, [-0.5, 0.01, 0.1], np.nan)
+    loads = found(moved(made, "right", to))
+    assert (loads.reason[time > 1.3, 0] == SWING).all() and loads.total_known.all()
+    assert (loads.reason[:, 1] == MEASURED).all()
+    loads = found(steps(4.0, {**ON_ONE_LEG, "right": [*ON_ONE_LEG["right"], Stance(1.6, 4.0, -0.5, 0.1)]}, TWO_PLATES))
+    assert (loads.reason[time > 1.7, 0] == OFF_PLATE).all() and not loads.total_known[time > 1.7].any()
+
+
+def test_a_foot_that_is_held_beside_the_other_one_is_not_on_its_plate() -> None:
+    """Its outline is 8 cm from where the one that stands presses."""
+    made = steps(4.0, ON_ONE_LEG, TWO_PLATES)
+    time = made.recording.time
+    loads = found(moved(made, "right", np.where(time[:, None] > 1.4, [0.0, 0.12, -0.02], np.nan)))
+    assert (loads.reason[time > 1.4, 0] == SWING).all() and loads.total_known.all()
+    assert (loads.reason[:, 1] == MEASURED).all()
+
+
+@pytest.mark.parametrize("about", [-0.09, 0.02])
+def test_a_foot_that_turns_about_its_heel_or_its_ball_stands(about: float) -> None:
+    made = turning(steps(4.0, ON_ONE_LEG, TWO_PLATES), about)
+    loads = found(made)
+    assert (loads.reason[:, 1] == MEASURED).all() and loads.total_known.all()
+    np.testing.assert_allclose(loads.wrench[:, 1, 1], made.push[:, 1], atol=12.0)
 
 
 def test_a_jump_is_flight_and_not_a_step() -> None:

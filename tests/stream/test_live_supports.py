@@ -14,7 +14,21 @@ from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UN
 from dynakin.recordings.standing import marker_velocities
 from dynakin.settings import presets
 from dynakin.stream.feet import LiveFeet
-from support.made_steps import FOOT_MARKERS, LABORATORY, Made, MadePlate, Stance, lasting, sliding_in, steps, walk
+from support.made_steps import (
+    FOOT_MARKERS,
+    LABORATORY,
+    ON_ONE_LEG,
+    TWO_PLATES,
+    Made,
+    MadePlate,
+    Stance,
+    lasting,
+    moved,
+    sliding_in,
+    steps,
+    turning,
+    walk,
+)
 
 
 def live(made: Made) -> list[FootLoads]:
@@ -101,6 +115,16 @@ def test_a_box_and_a_foot_held_up_live() -> None:
     reason = np.concatenate([one.reason for one in now])
     assert (reason[time > 1.4, 0] == SWING).all()
     assert all(bool(one.total_known[0]) for one, t in zip(now, time, strict=True) if t > 1.4)
+
+
+def test_who_stands_on_one_leg_and_turns_on_it_live() -> None:
+    """The other foot is held beside it, 8 cm from where it presses."""
+    made = steps(4.0, ON_ONE_LEG, TWO_PLATES)
+    time = made.recording.time
+    held = moved(made, "right", np.where(time[:, None] > 1.4, [0.0, 0.12, -0.02], np.nan))
+    reason, push, _, _ = both(turning(held, 0.02))
+    assert (reason[time > 1.4] == [SWING, MEASURED]).all()
+    np.testing.assert_allclose(push[time > 1.4, 1], made.push[time > 1.4, 1], atol=12.0)
 
 
 def test_a_plate_that_is_off_its_place_stays_the_foots_that_leaves_it_live() -> None:

@@ -191,3 +191,34 @@ def sliding_in(made: Made, feet: Mapping[str, Sequence[Stance]], late_s: float, 
             if stance.start > 0.0:
                 markers[:, [made.recording.marker_names.index(name) for name in names], 0] -= speed_m_s * left[:, None]
     return replace(made, recording=replace(made.recording, markers=markers))
+
+
+ON_ONE_LEG = {
+    "right": [Stance(0.0, 1.0, 0.0, 0.1, 0.0, ("p0",))],
+    "left": [Stance(0.0, 4.0, 0.0, -0.1, 0.0, ("p1",))],
+}
+TWO_PLATES = [MadePlate("p0", z=(0.0, 0.3)), MadePlate("p1", z=(-0.3, 0.0))]
+
+
+def moved(made: Made, side: str, to: np.ndarray) -> Made:
+    """The same with a foot's markers where its sole's middle is to be, (T, 3) m; NaN: where they were."""
+    markers = made.recording.markers.copy()
+    columns = [made.recording.marker_names.index(name) for name in FOOT_MARKERS[side]]
+    markers[:, columns] += np.nan_to_num(to - made.sole[:, list(FOOT_MARKERS).index(side)])[:, None]
+    return replace(made, recording=replace(made.recording, markers=markers))
+
+
+def turning(made: Made, about: float) -> Made:
+    """The same with the left foot, its heel 60 mm up, turning once round from 1.6 to 2.4 s about a point so far (m)
+    ahead of its sole's middle: its toe moves at 0.9 to 2 m/s."""
+    time, markers = made.recording.time, made.recording.markers.copy()
+    angle = np.pi * (1.0 - np.cos(np.pi * np.clip((time - 1.6) / 0.8, 0.0, 1.0)))
+    middle = made.sole[:, 1] + [about, 0.0, 0.0]
+    for name in FOOT_MARKERS["left"]:
+        place = markers[:, made.recording.marker_names.index(name)]
+        x, z = (place - middle)[:, [0, 2]].T
+        place[:, 0] = middle[:, 0] + x * np.cos(angle) + z * np.sin(angle)
+        place[:, 2] = middle[:, 2] - x * np.sin(angle) + z * np.cos(angle)
+        if name.endswith("HEE"):
+            place[:, 1] += np.interp(time, [1.3, 1.5, 2.5, 2.7], [0.0, 0.06, 0.06, 0.0])
+    return replace(made, recording=replace(made.recording, markers=markers))

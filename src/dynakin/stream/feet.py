@@ -20,11 +20,13 @@ from dynakin.recordings.feet.belt import WINDOW_S, velocities
 from dynakin.recordings.feet.contact import (
     AFTER_S,
     ALOFT_M,
+    ALONE_M,
     LEVEL_M_S,
     NEAR_M,
     NEAR_SUPPORT_M,
     RESTS_S,
     SLOW_M_S,
+    pivots,
 )
 from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
@@ -279,6 +281,8 @@ class LiveFeet:
         against[:, :, [0, 2]] -= self._belts.velocity[:, None]
         with np.errstate(invalid="ignore"):
             slow = np.linalg.norm(against, axis=2) < SLOW_M_S
+        at = np.vstack([places, np.full(3, np.nan)])[self._own]
+        slow |= pivots(at, against)[:, None] & (self._own < len(places))
         self._rest(time_s, own_height, slow)
         touching = slow & (np.abs(own_height - self._level[:, None]) < NEAR_SUPPORT_M)
         touching |= slow & (own_height < NEAR_SUPPORT_M)
@@ -286,7 +290,7 @@ class LiveFeet:
         self._flat = (touching | (self._own == len(places))).all(axis=1) & self._marked
         low = ((own_height < ALOFT_M) | (np.abs(own_height - self._level[:, None]) < ALOFT_M)).any(axis=1)
         moves = self._marked & ~slow.any(axis=1)
-        return np.vstack([places[:, [0, 2]], np.full(2, np.nan)])[self._own], low, moves
+        return at[:, :, [0, 2]], low, moves
 
     def _rest(self, time_s: float, height: Array, slow: Flags) -> None:
         """Which feet rest on something higher than their lowest place: they keep a height, and no other foot stands or
@@ -325,7 +329,8 @@ class LiveFeet:
         away = distance_to_hull(np.tile(cops, (F, 1)), np.repeat(outlines, P, axis=0)).reshape(F, P)
         away = np.where(np.isnan(away), np.inf, away)  # of a plate that is not loaded
         near = away < NEAR_M
-        self._under = near.copy()
+        alone = touches[:, None] & (away < ALONE_M)  # who stands on one leg holds the other foot beside it
+        self._under = near & (alone.sum(axis=0) == alone)
         loaded = np.array([plate.loaded[0] for plate in plates])
         self._shared[:, self._press_between(plates, cops, outlines, bears, away)] = True
         self._shared &= bears[:, None] & np.array([plate.pressed[0] for plate in plates])

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs, widened
 from dynakin.errors import ConfigError
 from dynakin.messages import note
-from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
+from dynakin.recordings.feet.contact import GAP_S, NEAR_SUPPORT_M, FootContact, foot_contacts, middle_velocity
 from dynakin.recordings.feet.findings import exchanged, plate_findings
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
 from dynakin.recordings.feet.like_the_other import like_the_other
@@ -27,10 +27,12 @@ from dynakin.recordings.feet.loads import FootLoads, divided
 from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.feet.who_stands_where import WhoStandsWhere
+from dynakin.recordings.feet.whole_load import plates_bear_all
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.standing import marker_velocities
 
 Flags = npt.NDArray[np.bool_]
 
@@ -65,7 +67,7 @@ def foot_loads(
     forward = ground.vectors_to_ground(ground.forward)[[0, 2]]
     contacts = foot_contacts(recording, ground, foot_markers, plates)
     contacts = like_the_other(contacts, plates, forward, recording.rate)
-    return _Assignment(recording, tuple(foot_markers), contacts, plates, fixed, forward).loads()
+    return _Assignment(recording, ground, tuple(foot_markers), contacts, plates, fixed, forward).loads()
 
 
 def check_assigned(fixed: Mapping[str, str], recording: Recording, bearers: tuple[str, ...]) -> None:
@@ -109,13 +111,15 @@ class _Assignment:
     def __init__(
         self,
         recording: Recording,
+        ground: GroundFrame,
         feet: tuple[str, ...],
         contacts: dict[str, FootContact],
         plates: list[GroundPlate],
         fixed: dict[str, str],
         forward: Array,
     ) -> None:
-        self.recording, self.feet, self.contacts, self.plates, self.fixed = recording, feet, contacts, plates, fixed
+        self.recording, self.ground, self.feet = recording, ground, feet
+        self.contacts, self.plates, self.fixed = contacts, plates, fixed
         self.forward, self.sharing = forward, Sharing.of(list(contacts.values()), plates, forward, recording)
         n, F, P = recording.n_frames, len(feet), len(plates)
         self.step = round(STEP_S * recording.rate) if n > 1 else 0  # frames
@@ -128,6 +132,7 @@ class _Assignment:
         for k, foot in enumerate(feet):
             if foot in contacts:
                 self.stances(k, contacts[foot])
+        self.resting_on_nothing()
         self.aloft, steps = self.in_the_air(), self.steps()
         low = np.zeros((n, F), dtype=bool)
         for k, foot in enumerate(feet):
@@ -158,7 +163,7 @@ class _Assignment:
 
     def under_feet(self) -> Flags:
         """(T, F, P) plates whose centre of pressure lies under a foot. One on another level than the foot's own support
-        counts only where no other foot stands on its level: a box may stand on a plate."""
+        counts only where no other foot stands on its level: a box may stand on a plate. Nobody stands below one."""
         found = np.zeros_like(self.on)
         level = np.ones_like(self.on)
         for k, name in enumerate(self.feet):
@@ -167,7 +172,8 @@ class _Assignment:
             found[:, k] = foot.under
             for p, plate in enumerate(self.plates):
                 if plate.height_m is not None:
-                    level[:, k, p] = np.abs(foot.support_m - plate.height_m) < SAME_LEVEL_M
+                    over = foot.support_m - plate.height_m
+                    level[:, k, p] = (over > -NEAR_SUPPORT_M) & (over < SAME_LEVEL_M)
         return np.asarray(found & (level | ~(found & level).any(axis=1, keepdims=True)))
 
     def stances(self, k: int, foot: FootContact) -> None:
@@ -195,6 +201,12 @@ class _Assignment:
                 self.off[reach, k] = True
             else:
                 self.off[inside, k] |= self.beyond_edges(foot, inside)
+
+    def resting_on_nothing(self) -> None:
+        """Feet off the plates stand on nothing while these bear the person."""
+        if self.plates and self.off.any():
+            body = middle_velocity(self.ground.vectors_to_ground(marker_velocities(self.recording)))
+            self.off[plates_bear_all(self.plates, self.on, self.off, body[:, 1], self.recording.rate)] = False
 
     def presses(self, p: int, plate: GroundPlate) -> None:
         """Presses of a plate on which no foot stands still: they are the foot's that is low and near for most of the

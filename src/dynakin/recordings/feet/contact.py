@@ -30,8 +30,8 @@ NEAR_SUPPORT_M = 0.025
 """Height of a marker over its place when standing flat (its 5th percentile, raised by the support) up to which the skin
 under it may touch the support."""
 SLOW_M_S = 0.5
-"""Speed against the support up to which a foot stands. A swinging toe passes the floor within 2 cm too, but at 1.5 to
-5 m/s."""
+"""Speed against the support up to which a foot stands, of a marker, or of the point that the foot turns about
+(`pivots`). A swinging toe passes the floor within 2 cm too, but at 1.5 to 5 m/s."""
 GAP_S = 0.08
 """Shorter interruptions of a stance, or stances, are none: a foot takes 0.2 s and more for a step."""
 ALOFT_M = 0.05
@@ -42,6 +42,9 @@ BEFORE_S, AFTER_S = 0.05, 0.15
 LEVEL_M_S, RESTS_S = 0.15, 0.15
 """A foot rests on something higher where it keeps its height to that speed, for so long: at the top of its swing, or of
 a jump, it does for 0.05 s."""
+ALONE_M = 0.03
+"""How far from the markers of a flat foot a centre of pressure lies that it may bear alone, or what it turns about: of
+feet on plates of their own it comes to 0.012."""
 NEAR_M = 0.10
 """How far a centre of pressure may lie from the outline of a foot's markers: a shoe is some cm wider than these."""
 COP_REFUSED_M = 0.30
@@ -108,7 +111,7 @@ def foot_contacts(
         plates: what may say that a foot stands higher than the floor.
     """
     velocity = ground.vectors_to_ground(marker_velocities(recording))
-    body = _middle_velocity(velocity)
+    body = middle_velocity(velocity)
     floor = floor_height(recording, ground)
     seen = foot_places(recording, ground, markers)
     flats = [np.nanpercentile(places[:, :, 1], 5.0, axis=0) for _, places in seen.values()]  # (K,) m, standing flat
@@ -140,11 +143,31 @@ def foot_places(
     return found
 
 
+def pivots(places: Array, velocity: Array) -> Flags:
+    """(T,) frames in which markers (T, K, 3) m turn about a point at or near them that is slow: a foot that turns on
+    its ball, or on its heel, stands there, though none of its markers is slow."""
+    seen = np.asarray(np.isfinite(places).all(axis=2) & np.isfinite(velocity).all(axis=2))
+    count = np.maximum(seen.sum(axis=1), 1)[:, None]
+    at, moves = (np.where(seen[..., None], values[..., [0, 2]], 0.0) for values in (places, velocity))
+    climbs = np.abs(np.where(seen, velocity[..., 1], 0.0).sum(axis=1) / count[:, 0])
+    middle, drift = at.sum(axis=1) / count, moves.sum(axis=1) / count
+    at, moves = (np.where(seen[..., None], v - m[:, None], 0.0) for v, m in ((at, middle), (moves, drift)))
+    turn = (at[..., 0] * moves[..., 1] - at[..., 1] * moves[..., 0]).sum(axis=1)
+    turn = turn / np.maximum(np.square(at).sum(axis=(1, 2)), 1e-9)  # rad/s about the vertical
+    turn = np.where(np.abs(turn) > 1e-6, turn, 1e-6)  # so slow a turn is about a point that is far off
+    pivot = middle + np.stack([-drift[:, 1], drift[:, 0]], axis=1) / turn[:, None]
+    away = distance_to_hull(pivot, np.where(seen[..., None], places[..., [0, 2]], np.nan))
+    with np.errstate(invalid="ignore"):
+        slow = np.hypot(turn * away, climbs) < SLOW_M_S
+        return np.asarray((seen.sum(axis=1) > 1) & (away < ALONE_M) & slow)
+
+
 def _settle(feet: list[_Foot]) -> None:
     """Believe that feet rest on what is higher than the floor: where a plate carries one; then, the longest first,
     where no other one stands for a while, or one stands that is on a level with it."""
     for foot in feet:
-        for rest in [one for one in foot.waiting if foot.carried(one[0])]:
+        others = [other for other in feet if other is not foot]
+        for rest in [one for one in foot.waiting if foot.carried(one[0], others)]:
             foot.believe(rest)
     while True:
         waiting = [(rest[0].stop - rest[0].start, k, rest) for k, foot in enumerate(feet) for rest in foot.waiting]
@@ -157,7 +180,7 @@ def _settle(feet: list[_Foot]) -> None:
             return
 
 
-def _middle_velocity(velocity: Array) -> Array:
+def middle_velocity(velocity: Array) -> Array:
     """(T, 3) m/s: the median over markers (T, M, 3), NaN where none is seen."""
     found = np.full((len(velocity), 3), np.nan)
     seen = np.asarray(np.isfinite(velocity)).any(axis=(1, 2))
@@ -187,12 +210,13 @@ class _Foot:
         with np.errstate(invalid="ignore"):
             against = velocity - np.stack([self.belt[:, 0], np.zeros(n), self.belt[:, 1]], axis=1)[:, None]
             self.speed = np.linalg.norm(against, axis=2)
-            self.slow = self.speed < SLOW_M_S
+            self.slow = (self.speed < SLOW_M_S) | (pivots(places, against)[:, None] & np.isfinite(self.speed))
             base = (self.rise < NEAR_SUPPORT_M) & self.slow
         lowest = np.where(np.isfinite(self.rise), self.rise, np.inf).min(axis=1)
         self.lift = np.where(np.isfinite(lowest), lowest, np.nan)  # (T,) of the foot's lowest part
         self.outline = filled_by_others(places[:, :, [0, 2]])
-        self.near = [distance_to_hull(plate.cop, self.outline) < NEAR_M for plate in plates]
+        self.away = [distance_to_hull(plate.cop, self.outline) for plate in plates]
+        self.near = [away < NEAR_M for away in self.away]
         # of what is seen for one frame alone nobody knows whether it stands
         self.seen = np.asarray(np.isfinite(self.speed).any(axis=1)) if n > 1 else np.isfinite(self.lift)
         self.touching, self.level = np.zeros_like(base), np.full(n, np.nan)
@@ -245,12 +269,16 @@ class _Foot:
         heights = [float(np.min(foot.flat)) + foot.level[rest[0]] for foot in others]
         return any(bool((np.abs(height - own) < SAME_LEVEL_M).any()) for height in heights)
 
-    def carried(self, frames: slice) -> bool:
-        """Whether a plate is loaded under the foot for most of these frames."""
-        return any(
-            np.count_nonzero(near[frames] & plate.loaded[frames]) > 0.5 * (frames.stop - frames.start)
-            for near, plate in zip(self.near, self.plates, strict=True)
-        )
+    def carried(self, frames: slice, others: Sequence[_Foot]) -> bool:
+        """Whether a plate is loaded under the foot for most of these frames, where no other foot that stands may bear
+        it alone: who stands on one leg holds the other foot beside it."""
+        for p, plate in enumerate(self.plates):
+            own = self.near[p][frames] & plate.loaded[frames]
+            for other in others:
+                own &= ~(other.stands & (other.away[p] < ALONE_M))[frames]
+            if np.count_nonzero(own) > 0.5 * (frames.stop - frames.start):
+                return True
+        return False
 
     def contact(self) -> FootContact:
         """What was found."""
@@ -259,7 +287,7 @@ class _Foot:
         levels = [self._level(first, end) for first, end in stances]
         with np.errstate(invalid="ignore"):
             over = self.rise - self._between(stances, levels)[:, None]
-            high, fast = over > ALOFT_M, self.speed > SLOW_M_S
+            high, fast = over > ALOFT_M, (self.speed > SLOW_M_S) & ~self.slow
             low = np.asarray((np.minimum(over, self.rise) < ALOFT_M).any(axis=1))
         unseen = ~np.isfinite(self.rise)
         moves = np.asarray(self.seen & (fast | unseen).all(axis=1))

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from numpy.typing import ArrayLike
 
 from dynakin.arrays import runs
-from dynakin.recordings.feet.contact import FootContact
+from dynakin.recordings.feet.contact import ALONE_M, FootContact
 from dynakin.recordings.feet.soles import shape_of
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
@@ -24,9 +24,9 @@ from dynakin.recordings.recording import Array, Recording
 
 Flags = npt.NDArray[np.bool_]
 
-BETWEEN_M = 0.03
-"""How far from the markers of two flat feet a centre of pressure lies that neither bears alone, where one of them has
-no other plate, or for most of a press: of flat feet on plates of their own it comes to 0.012."""
+BETWEEN_M = ALONE_M
+"""So far from the markers of two flat feet neither bears alone, where one of them has no other plate, or for most of a
+press."""
 BESIDE_M, PRESSURE_NM = 0.035, 1.5
 """How far from both soles a centre of pressure lies that neither foot bears alone, and what its plate's moments may be
 off by besides, which tells less of a place the lighter the load: of 24 real recordings and 8 simulated walks and squats
