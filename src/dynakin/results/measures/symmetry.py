@@ -53,7 +53,7 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
         ``stances``: how many of each foot were compared, None where the window was. ``reason``: why legs are not.
     """
     time = estimate.time
-    angles = estimate.values("coordinates")[window]
+    angles = estimate.known("coordinates")[window]
     moments = sources.measured_moments(estimate.data)
     power = sources.measured_only(estimate.powers(), sources.moment_sources(estimate.data))
     stances, legs = compared_stances(estimate, window), sources.legs_of(estimate.data)
@@ -126,8 +126,8 @@ def _mean(of: Callable[..., float], values: Array, parts: Sequence[slice], *alon
 
 
 def _range(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.ptp(known)) if len(known) else float("nan")
+    """NaN where not all is known: what is missing may hold the largest or the smallest."""
+    return float(np.ptp(values))
 
 
 def _largest(values: Array) -> float:
