@@ -18,7 +18,7 @@ from dynakin.cli.prepared import assumed
 from dynakin.errors import RecordingError
 from dynakin.filter.closure import closure
 from dynakin.filter.impossible import impossible
-from dynakin.filter.sources import with_sources
+from dynakin.filter.sources import LiveSight, with_sources
 from dynakin.filter.total_wrench import Ground
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
@@ -536,6 +536,19 @@ def test_a_pelvis_whose_markers_vanish_is_as_unsure_as_it_errs_or_absent(left: i
         return
     assert (error[gap] < 2.0 * sd[gap]).mean() > 0.9 and (error[gap].max(axis=0) < 3.0 * sd[gap].max(axis=0)).all()
     assert (sd[gap].mean(axis=0) > np.median(sd, axis=0)).all()
+
+
+def test_live_a_pelvis_counts_as_unseen_while_fewer_than_two_of_its_markers_are_seen() -> None:
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    spec = person("fullbody").calibrate(walk).spec
+    sight, markers = LiveSight(spec), np.zeros((len(spec.markers), 3))
+    own = [k for k, marker in enumerate(spec.markers) if marker.segment == "pelvis"]
+    assert sight.look(0.0, markers) == {}
+    markers[own[2:]] = np.nan
+    assert sight.look(1.0, markers) == {}
+    markers[own[1:]] = np.nan
+    assert sight.look(1.1, markers) == {}  # the second was seen at 1.0 s
+    assert [name for name, gone in sight.look(1.4, markers).items() if gone] == ["pelvis"]
 
 
 def test_a_segment_that_never_has_a_marker_in_sight_is_no_gap() -> None:
