@@ -213,7 +213,7 @@ def test_warnings_of_the_calibration_are_part_of_what_is_found(case: Case, ident
     assert identified.warned == ()
     another, short = warning("calibration", "another person."), warning("calibration", "a leg is short.")
     doubtful = replace(case.common.initial, messages=(another, note("mass", "Mass 70 kg: given.")))
-    trial = replace(case.trials[0].movement, start=replace(doubtful, messages=(short,)))
+    trial = replace(case.trials[0].movement, doubts=(another, short))
     said = warned(replace(case.common, initial=doubtful), [replace(case.trials[0], movement=trial)])
     assert said == (another, short.of(case.sims[0].recording.name))
 
@@ -277,6 +277,18 @@ def test_a_trial_that_is_lost_is_left_out_and_a_lone_one_refused(case: Case) -> 
     assert found.subject.trials == (squat.name, sitting.name)
     (said,) = found.lost
     assert str(said) == found.subject.report[0] and "left out: " in said.text and "mislabelled" in said.text
+
+
+def test_frames_in_which_nobody_sees_a_limb_teach_nothing_and_are_told(case: Case) -> None:
+    """The pelvis of a squat was 21 deg off meanwhile; the subject's file had no warning."""
+    markers = (recording := case.sims[0].recording).markers.copy()
+    gone = [k for k, n in enumerate(recording.marker_names) if n.endswith(("toe", "5meta", "calc", "ankle"))]
+    gone += [k for k, n in enumerate(recording.marker_names) if "sh" in n and "Shoulder" not in n]
+    markers[300:370, gone] = np.nan
+    (trial,) = measure_all(case.common, [replace(recording, markers=markers)])
+    lost = trial.movement.lost
+    assert 10 < lost.sum() < 40 and np.isnan(trial.wrench[lost]).all() and np.isfinite(trial.wrench[~lost]).any()
+    assert any("No marker is seen of" in str(message) for message in warned(case.common, [trial]))
 
 
 def test_lost_frames_of_a_trial_that_is_followed_say_nothing_of_the_body(case: Case) -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from dynakin.cli.app import main
 from dynakin.errors import ModelError, RecordingError
-from dynakin.model.calibration.needs import lacking, needs
+from dynakin.model.calibration.needs import lacking, missing, needs
 from dynakin.model.definition import available_models, load_built_in_or_toml
 from dynakin.model.markers.anatomy import anatomy, expanded, standing_at
 from dynakin.model.markers.draft.by_name import places, said
@@ -303,6 +303,10 @@ def test_what_models_need_is_what_calibrating_asks_for() -> None:
         for gone, expected in (("KNE", not model.sided), ("ASI", True)):
             without = {side: places - {gone} for side, places in there.items()}
             assert any(not need.optional for need, _ in lacking(model, without)) == expected, (name, gone)
+    sagittal = load_built_in_or_toml("sagittal7").model
+    bare = {side: places - {"ELB", "ELM", "EJC", "EJ"} for side, places in there.items()}
+    assert not missing(sagittal, bare, ["thigh"])  # an arm without markers is held
+    assert {need.landmark for need, _ in missing(sagittal, bare, ["forearm"])} == {"elbow"}  # as a run refuses it
     fullbody = load_built_in_or_toml("fullbody").model
     knee = next(need for need in needs(fullbody) if need.landmark == "knee")
     assert knee.sided and knee.optional and frozenset({"KNE", "KNM"}) in knee.ways

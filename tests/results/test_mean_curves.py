@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +53,16 @@ def test_curves_run_from_start_to_end_and_their_spread_is_the_samples_over_repet
     moment = found["knee/moment"]
     np.testing.assert_allclose(moment.mean_per_kg, 2.0)
     np.testing.assert_allclose(moment.sd_per_kg, 0.0, atol=1e-12)
+
+
+def test_an_angle_without_a_deviation_is_no_value(estimate: Estimate) -> None:
+    """Nobody saw the knee in the middle of the first repetition: the number there is only where the body is posed."""
+    items = repetitions_of(estimate).items
+    middle, sd = (items[0].first + items[0].last) // 2, estimate.data["coordinates_sd"].copy()
+    sd.loc[{"coordinate": "knee"}][{"time": slice(middle - 10, middle + 10)}] = np.nan
+    hidden = replace(estimate, data=estimate.data.assign(coordinates_sd=sd))
+    (curve,) = [c for c in estimate_curves(hidden) if c.quantity == "knee" and c.method != MEASURED]
+    assert curve.n.min() == len(items) - 1 and curve.n.max() == len(items) == curve.of
 
 
 def test_one_repetition_has_no_deviation_and_gaps_do_not_count() -> None:

@@ -91,7 +91,7 @@ def test_of_all_groups_the_word_that_matters_most() -> None:
 
 def test_the_thresholds_are_of_statistics_that_exist_and_in_order() -> None:
     names = set(statistics_of(TIME, drawn(7), drawn(8)))
-    assert set(limits()) == {"declared", "calibrated"}
+    assert set(limits()) == {"declared", "calibrated", "given"}
     for groups in limits().values():
         assert set(groups) == set(GROUPS)
         for own in groups.values():
@@ -103,6 +103,8 @@ def test_noise_is_calibrated_where_its_scales_were_found_here_or_elsewhere() -> 
     assert noise_from({}) == noise_from({"noise_used": {"variance_scale": 1.0, "jerk_scale": {}}}) == "declared"
     assert noise_from({"noise_used": {"variance_scale": 0.2, "jerk_scale": {}}}) == "calibrated"
     assert noise_from({"noise_used": {"variance_scale": 1.0, "jerk_scale": {"feet": 2.0}}}) == "calibrated"
+    given = {"variance_scale": 0.2, "jerk_scale": {"feet": 2.0}}  # by a preset: nothing was found in this recording
+    assert noise_from({"noise": {"adapt": False, **given}, "noise_used": given}) == "given"
 
 
 def test_what_lasts_is_borne_further_where_the_noise_was_calibrated() -> None:

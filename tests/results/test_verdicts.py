@@ -50,7 +50,7 @@ def test_a_good_planar_run_is_called_so(squat: Recording) -> None:
 def test_a_scale_that_is_not_this_recordings_is_found_out(walk: Recording) -> None:
     """A hundredth and a hundred times of what it would find."""
     small = run("fullbody", walk, Noise(adapt=False, variance_scale=0.002))
-    assert small.noise == "calibrated" and small.judgements["motion"] == "overconfident"
+    assert small.noise == "given" and small.judgements["motion"] == "overconfident"
     large = run("fullbody", walk, Noise(adapt=False, variance_scale=20.0))
     assert large.judgement == "conservative"
 

@@ -87,7 +87,7 @@ def new(
 
     Each line says how sure it is and why. Nothing is asked; what is missing for each model is listed at once.
     """
-    from dynakin.model.calibration.needs import in_words, lacking
+    from dynakin.model.calibration.needs import in_words, missing
     from dynakin.model.definition import available_models, load_built_in_or_toml
     from dynakin.model.markers.anatomy import anatomy
     from dynakin.model.markers.draft.draft import guess_markers
@@ -123,13 +123,14 @@ def new(
         if those:
             console.print(f"{what}: {'; '.join(those)}.", soft_wrap=True)
     there = {side: {g.place for g in used if g.place and g.side == side} for side in ("right", "left", "centre")}
+    marked = {str(g.segment or anatomy()["places"].get(g.place, {}).get("segment", "")) for g in used}
     for name in available_models():
-        missing = [(n, side) for n, side in lacking(load_built_in_or_toml(name).model, there) if not n.optional]
-        if not missing:
+        lacks = missing(load_built_in_or_toml(name).model, there, marked)
+        if not lacks:
             console.print(f"Model {name}: nothing is missing.")
             continue
         wants: dict[str, list[str]] = {}
-        for need, side in missing:
+        for need, side in lacks:
             wants.setdefault(f"{need.landmark.replace('_', ' ')}: {in_words(need)}", []).append(side)
         words = "; ".join(f"{' and '.join(filter(None, sides))} {what}".strip() for what, sides in wants.items())
         console.print(f"Model {name} lacks {words}.", soft_wrap=True)

@@ -75,6 +75,9 @@ def _moved(posterior: Posterior) -> list[str]:
 def base_in_words(batch: Batch) -> list[str]:
     """How sure: what is known of the sums that plates identify, and of which the data say nothing."""
     values, sd, prior = base_of_batch(batch)
+    asked = np.flatnonzero(prior > GIVEN * np.maximum(1.0, np.abs(values)))
+    values, sd, prior = values[asked], sd[asked], prior[asked]
+    sums, names = [batch.base_words[k] for k in asked], [batch.base_names[k] for k in asked]
     share = np.divide(sd, prior, out=np.ones_like(sd), where=prior > 0.0)
     verdicts = [judged(float(s)) for s in share]
     counts = {word: verdicts.count(word) for word in ("known", "partly", "nothing")}
@@ -84,17 +87,18 @@ def base_in_words(batch: Batch) -> list[str]:
     ]
     best = np.argsort(share)[:5]
     known = [
-        f"{batch.base_words[k]} = {number(float(values[k]))} (sd {number(float(sd[k]))}, {100 * share[k]:.0f} % of the "
-        "table's)"
+        f"{sums[k]} = {number(float(values[k]))} (sd {number(float(sd[k]))}, {100 * share[k]:.0f} % of the table's)"
         for k in best
     ]
     said.append(f"Best known: {'; '.join(known)}.")
-    none = [batch.base_names[k].removeprefix("inertia/") for k in range(len(share)) if verdicts[k] == "nothing"]
+    none = [names[k].removeprefix("inertia/") for k in range(len(share)) if verdicts[k] == "nothing"]
     if none:
         said.append(f"The data say nothing of the sums named after {listed(none, 30)}: these lean on the table.")
     return said
 
 
+GIVEN = 1e-6
+"""Of a number (SI), what is no uncertainty of it: a mass that is given was not identified (its deviation is 3e-8)."""
 ROUNDING = 1e-9
 """Of a number (SI), what no session can show: a total mass that is given has no deviation, and differs by 1e-14."""
 

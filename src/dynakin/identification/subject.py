@@ -97,10 +97,10 @@ def identify_subject(
 
 
 def warned(common: Common, trials: Sequence[MeasuredTrial]) -> tuple[Message, ...]:
-    """Warnings of the calibrations and the plates: first of the subject, then of trials what was not said before."""
+    """What runs would warn of: first of the subject, then of trials what was not said before."""
     said = warnings_of(common.initial.messages)
     for trial in trials:
-        own = (*warnings_of(trial.movement.start.messages), *trial.doubts)
+        own = (*trial.movement.doubts, *trial.doubts)
         said += [message.of(trial.movement.recording.name) for message in own if message not in said]
     return tuple(said)
 

@@ -12,8 +12,9 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.sources import ContactSources, hidden_segments, root_of
 from dynakin.filter.tracker import Tracker
-from dynakin.messages import Message
+from dynakin.messages import Message, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.companions import another_person
@@ -21,6 +22,7 @@ from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
 from dynakin.recordings.times import step_of
+from dynakin.results.measures.sources import unseen_in_words
 from dynakin.results.measures.tracking import why_lost
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.units import GRAVITY_M_S2
@@ -50,16 +52,19 @@ class Movement:
 
     Attributes:
         recording: as read, its plates taken away. time: (T,) s. states: (T, n) of `Common.core`, with the constants
-            of the start. start: the trial's own coordinates and ground frame. lost: (T,) frames that are no estimate.
+            of the start. lost: (T,) frames that are no estimate, of the person or of a limb that nobody sees.
         unfiltered: (T, n) states with the smoother's own coordinates, speeds and accelerations, not low-passed.
+        start: the trial's own coordinates and ground frame.
+        doubts: what a run would warn of its markers.
     """
 
     recording: Recording
     time: Array
     states: Array
-    start: CalibratedModel
     lost: npt.NDArray[np.bool_]
     unfiltered: Array
+    start: CalibratedModel
+    doubts: tuple[Message, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,8 +190,15 @@ class Common:
             states[:, at] = values
             own = [names.index(name) for name in self.core.layout.names[at]]
             unfiltered[:, at] = arrays["state"][:, own]
-        lost = judged.lost[::every]
-        return Movement(recording, recording.time[::every], states[::every], start, lost, unfiltered[::every])
+        hidden = hidden_segments(self.initial.spec, markers, recording.time)
+        lost = judged.lost | ContactSources.of(start).unseen(hidden, recording.n_frames).any(axis=1)
+        doubts = warnings_of([*recording.notes, *start.messages])
+        if said := unseen_in_words(hidden, recording.time, root_of(self.initial.spec)):
+            doubts.append(warning("recording", f"{said} These frames are left out."))
+        kept = slice(None, None, every)
+        return Movement(
+            recording, recording.time[kept], states[kept], lost[kept], unfiltered[kept], start, tuple(doubts)
+        )
 
     def with_plates(self, movement: Movement, recording: Recording) -> MeasuredTrial:
         """The movement with the plates of its recording; NaN in frames in which the person was lost, or in which the

@@ -218,7 +218,7 @@ def _joint_values(estimate: Estimate, joints: list[Joint]) -> dict[str, Array]:
 
 
 def _degrees(estimate: Estimate) -> Array:
-    shown = reported(estimate).of(estimate.values("coordinates"))
+    shown = reported(estimate).of(estimate.known("coordinates"))
     return np.asarray(shown * np.where(estimate.is_rotation(), 180.0 / np.pi, 1000.0))
 
 

@@ -27,6 +27,13 @@ def values_of(data: xr.Dataset, name: str) -> np.ndarray:
     return np.asarray(data[name].transpose(*DIMENSIONS, missing_dims="ignore").values)
 
 
+def known_of(data: xr.Dataset, name: str) -> np.ndarray:
+    """`values_of` of coordinates, speeds or accelerations, NaN where they have no deviation: nobody sees these joints,
+    and the number is only where the body is posed."""
+    values = values_of(data, name)
+    return np.where(np.isnan(values_of(data, f"{name}_sd")), np.nan, values) if f"{name}_sd" in data else values
+
+
 @dataclass(frozen=True, repr=False)
 class Estimate:
     """What one run estimated. Do not change it: every output file and the report are made from it.
@@ -111,6 +118,10 @@ class Estimate:
     def values(self, name: str) -> np.ndarray:
         """A variable of ``data`` as an array, its dimensions in the order of the table."""
         return values_of(self.data, name)
+
+    def known(self, name: str) -> np.ndarray:
+        """`known_of` of ``data``."""
+        return known_of(self.data, name)
 
     @property
     def coordinate_names(self) -> list[str]:

@@ -58,7 +58,7 @@ def angle_differences(trials: Sequence[Trial]) -> list[AngleDifference]:
                 turn = bool(trial.rotation[k])
                 scale = np.degrees(1.0) if turn else 1000.0
                 w = trial.window
-                error = truth_error(scale * reference.coordinates[w, k], scale * method.coordinates[w, k])
+                error = truth_error(scale * reference.coordinates[w, k], scale * method.known_coordinates()[w, k])
                 found.setdefault((name, "deg" if turn else "mm", method.name, reference.name), []).append(error)
     return [
         AngleDifference(*key, *(spread([error[k] for error in errors]) for k in range(len(TruthError._fields))))

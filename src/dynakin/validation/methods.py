@@ -21,7 +21,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.progress import Progress, stage
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import Estimate, values_of
+from dynakin.results.estimate import Estimate, known_of, values_of
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.mean_curves import MEASURED, MeanCurve, mean_curves, signals
@@ -75,6 +75,10 @@ class Method:
     wrench: Array
     data: xr.Dataset
 
+    def known_coordinates(self) -> Array:
+        """Coordinates (T, C), NaN where nobody sees the joint."""
+        return np.where(np.isnan(known_of(self.data, "coordinates")), np.nan, self.coordinates)
+
     def measured_moments(self) -> Array:
         """Moments (T, C), NaN where a contact behind them is not measured: what figures and mean curves take."""
         return measured_only(self.moments, moment_sources(self.data))
@@ -123,7 +127,11 @@ class Trial:
         names, rotation = self.coordinate_names, self.rotation
         methods = {
             m.name: signals(
-                names, rotation, m.coordinates, m.measured_moments(), measured_only(m.wrench, wrench_sources(m.data))
+                names,
+                rotation,
+                m.known_coordinates(),
+                m.measured_moments(),
+                measured_only(m.wrench, wrench_sources(m.data)),
             )
             for m in self.methods
         }

@@ -3,6 +3,7 @@ together."""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 from dynakin.errors import ModelError
@@ -10,12 +11,14 @@ from dynakin.messages import Message, warning
 from dynakin.model.calibration.completion import free
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
+from dynakin.model.calibration.needs import in_words, needs
 from dynakin.model.calibration.posture import frame_landmarks
 from dynakin.model.calibration.sites import as_marked, candidates, find_locks
 from dynakin.model.markers.fit import lacking
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
+from dynakin.results.naming import words
 
 
 def in_both(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
@@ -26,6 +29,21 @@ def in_both(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
     recorded = tuple(name for name in match.recorded if name in other.recorded)
     where, left_out = f"{match.where} with {other.where}", match.left_out | other.left_out
     return MarkerMatch(match.marker_set, names, recorded, where, left_out)
+
+
+def _refuse_unnamed(model: ModelFile, finder: LandmarkFinder, wanted: Collection[str]) -> None:
+    """Refuse a set that has no place from which a landmark follows, with the places that would do (`needs.missing`)."""
+    said = []
+    for need in needs(model):
+        if need.landmark in wanted and not finder.has_recipe(need.landmark):
+            parts = " and ".join(words(name) for name in need.segments)
+            line = f"no marker shows where the {words(need.landmark)} is, which {parts} need: {in_words(need)}"
+            said.append(f"{line} (or no marker on {parts}, which is then held still)" if need.optional else line)
+    if said:
+        raise ModelError(
+            f"{finder.match.where}, marker set {finder.match.marker_set.name}, model {model.name}: {'; '.join(said)}. "
+            "Expected one of these places in the set (dynakin markers places says what they are)"
+        )
 
 
 def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, float | None]) -> set[MarkerKey]:
@@ -40,6 +58,7 @@ def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, fl
     if model.ground.origin:
         wanted.setdefault(model.ground.origin, f"the ground origin of model {model.name}")
     if not model.sided:
+        _refuse_unnamed(model, finder, wanted)
         finder.require(wanted)
     keys: set[MarkerKey] = set()
     for name in wanted:

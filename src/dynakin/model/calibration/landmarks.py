@@ -81,6 +81,10 @@ class LandmarkFinder:
         wanted = SIDES if self.side == "both" else (self.side,)
         return [side for side in wanted if self.recipe(name, side) is not None]
 
+    def has_recipe(self, name: str) -> bool:
+        """Whether the marker set has the places that this landmark follows from, marked in the recording or not."""
+        return name.startswith(_FLOOR) or name in self._recipes
+
     def known(self, name: str) -> bool:
         """Whether the recording has the markers for this landmark."""
         return name.startswith(_FLOOR) or bool(self._sides_of(name))
@@ -99,7 +103,7 @@ class LandmarkFinder:
         lacking: dict[str, list[str]] = {}
         for name, why in wanted.items():
             if not self.known(name):
-                how = "no recipe for it" if name not in self._recipes else self._first_absent(name, side)
+                how = self._first_absent(name, side)
                 lacking.setdefault(how, []).append(f"landmark {name!r} ({why})")
         if lacking:
             raise ModelError(

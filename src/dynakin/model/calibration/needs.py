@@ -75,6 +75,21 @@ def lacking(model: ModelFile, there: Mapping[str, Collection[str]]) -> list[tupl
     return found
 
 
+def missing(model: ModelFile, there: Mapping[str, Collection[str]], marked: Collection[str]) -> list[tuple[Need, str]]:
+    """Of what is `lacking` that for want of which the model is refused: in the plane also what a segment can do without
+    only as long as nothing is marked on it (`find_locks`).
+
+    Args:
+        marked: parts of the body with a marker.
+    """
+    bearing = {s.name for s in model.segments if {s.name, *s.parts, *s.takes_markers_of} & set(marked)}
+    return [
+        (need, side)
+        for need, side in lacking(model, there)
+        if not need.optional or (not model.sided and bearing & set(need.segments))
+    ]
+
+
 def in_words(need: Need, most: int = 3) -> str:
     """The ways as text: "KNE + KNM, or KJC"."""
     short = sorted(need.ways, key=len)[:most]

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynakin.arrays import runs
-from dynakin.recordings.times import span, step_of
+from dynakin.recordings.times import step_of
 from dynakin.report.findings.finding import Insight, Level, Metrics
 from dynakin.report.labels import short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import LOG
 from dynakin.results.measures.soft_tissue import marker_sites
-from dynakin.results.measures.sources import out_of_sight
+from dynakin.results.measures.sources import floating_root, out_of_sight, unseen_in_words
 from dynakin.results.naming import listed, number, sentence, words
 from dynakin.results.records import REFUSED
 
@@ -27,10 +26,8 @@ ADVICE = {
 
 def missing(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """Gaps; a warning where no marker of a segment is seen for so long that its joints are carried on, not measured."""
-    unseen = _unseen(estimate)
-    if unseen:
-        whose = listed([f"{words(segment)} from {times}" for segment, times in unseen.items()])
-        return Insight("warning", "Unseen", f"No marker is seen of {whose}.", ADVICE["unseen"])
+    if said := _unseen(estimate):
+        return Insight("warning", "Unseen", said, ADVICE["unseen"])
     gaps: dict[str, int] = metrics["events"]["missing_frames"]
     if not gaps:
         return Insight("good", "Gaps", "Every marker in use was measured in every frame.")
@@ -42,13 +39,12 @@ def missing(estimate: Estimate, metrics: Metrics) -> Insight | None:
     return Insight("note", "Gaps", f"Markers missing for part of the recording: {listed(text)}.")
 
 
-def _unseen(estimate: Estimate) -> dict[str, str]:
-    """Segments, and the times in which none of their markers is seen although some are at other times."""
+def _unseen(estimate: Estimate) -> str:
+    """On segments none of whose markers is seen for some time although some are at other times."""
     segments, time = estimate.marker_segments, estimate.time
     owners = [segments.get(site, "") for _, site in marker_sites(estimate)]
-    hidden = out_of_sight(np.isfinite(estimate.values("markers_measured")).any(axis=2), owners, time)
-    spans = {name: [span(time, a, b) for a, b in runs(own)] for name, own in hidden.items()}
-    return {name: listed(own, 3) for name, own in spans.items() if own}
+    seen, root = np.isfinite(estimate.values("markers_measured")).any(axis=2), floating_root(estimate.data)
+    return unseen_in_words(out_of_sight(seen, owners, time, root), time, root)
 
 
 def gated(estimate: Estimate, metrics: Metrics) -> Insight | None:

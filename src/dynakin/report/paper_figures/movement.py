@@ -89,7 +89,7 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
 
 def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 5: every free coordinate with its band, right and left over each other, with the classical method's."""
-    values, sd = estimate.values("coordinates"), estimate.values("coordinates_sd")
+    values, sd = estimate.known("coordinates"), estimate.values("coordinates_sd")
     joints = [joint for joint in joints_of(estimate) if np.any(sd[:, list(joint.columns.values())])]
     if not joints:
         return None
@@ -113,7 +113,7 @@ def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
             wide = band_is_too_wide(own, 0.5 * half)  # it would press the line flat
             if not wide:
                 axes.fill_between(estimate.time, own - half, own + half, color=colour, alpha=0.18, linewidth=0)
-            notes.append(f"2 sd: {number(float(np.median(half)), unit, digits=2)}{' (too wide)' if wide else ''}")
+            notes.append(f"2 sd: {number(float(np.nanmedian(half)), unit, digits=2)}{' (too wide)' if wide else ''}")
         if alone:
             axes.margins(y=0.12)
             axes.set_xlabel("\n".join(notes))

@@ -20,7 +20,7 @@ def angle_section(page: Page) -> Section:
     """Coordinates with their bands of uncertainty."""
     estimate, lines_of = page.estimate, side_lines(page.estimate)
     sign, offset, _, asked = shown = reported(estimate)
-    values, sd = shown.of(estimate.values("coordinates")), estimate.values("coordinates_sd")
+    values, sd = shown.of(estimate.known("coordinates")), estimate.values("coordinates_sd")
     about = "Each in the direction in which the model counts, from the model’s zero."
     if asked:
         clinical = estimate.data.attrs["angle_signs"] == "clinical"
@@ -34,6 +34,9 @@ def angle_section(page: Page) -> Section:
         ranges, lines = [], []
         for side, k in joint.columns.items():
             own = factor * values[:, k]
+            if not np.isfinite(own).any():
+                ranges.append(f"{f'{side} ' if side else ''}not known")
+                continue
             low, high = float(np.nanmin(own)), float(np.nanmax(own))
             band, wide = _band(own, factor * sd[:, k])
             lines.append(Line(own, lines_of[side].colour, 1.2, band))

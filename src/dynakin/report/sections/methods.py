@@ -94,7 +94,7 @@ def angle_part(trial: Trial, key: str) -> Section:
             continue  # locked
         turn = bool(trial.rotation[k])
         unit, scale = ("deg", np.degrees(1.0)) if turn else ("mm", 1000.0)
-        lines = {method.name: scale * method.coordinates[:, k] for method in methods}
+        lines = {method.name: scale * method.known_coordinates()[:, k] for method in methods}
         note = f"RMS difference {_each({row.method: row.rms for row in rows}, unit)}"
         if len(rows) == 1:
             note += f", {number(rows[0].rms_about_mean.mean, unit)} about its mean"

@@ -13,11 +13,8 @@ from dynakin.report.sides import Joint, joints_of, normalising_mass, side_key, s
 from dynakin.report.styles import source_key
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.sources import measured_moments, moment_sources
+from dynakin.results.measures.sources import moment_sources
 from dynakin.results.naming import listed, number
-
-_NOT_MEANT = 0.02
-"""Below this share of the largest of its kind a quantity is too small for a ratio of the sides to say anything."""
 
 
 def power_section(page: Page) -> Section | None:
@@ -87,7 +84,6 @@ def asymmetry_section(page: Page) -> Section | None:
     if found is None or metrics["work"] is None:
         return None
     joints = [joint for joint in joints_of(estimate) if len(joint.columns) == 2]
-    small = _too_small(estimate, metrics, joints)
     keys = ("range", "peak_moment", "positive_work", "negative_work")
     tables = []
     for region, folded in (("Legs", False), ("Arms", True)):
@@ -95,7 +91,9 @@ def asymmetry_section(page: Page) -> Section | None:
         for joint in joints:
             if joint.region == region and joint.stem in found["coordinates"]:
                 own = found["coordinates"][joint.stem]
-                rows.append((joint.title, *(_percent(own[key], (joint.stem, key) in small) for key in keys)))
+                rows.append(
+                    (joint.title, *(_percent(own[key], key in found["small"].get(joint.stem, ())) for key in keys))
+                )
         if rows:
             headings = ("", "range", "peak moment", "positive work", "negative work")
             tables.append(TextTable(f"{region}: symmetry index, %", headings, rows, (1, 2, 3, 4), folded))
@@ -120,25 +118,6 @@ def _compared(found: Mapping[str, Any]) -> str:
         each = listed([f"{count} of the {foot} foot" for foot, count in stances.items()])
         how = f" Moments, work and forces of the legs are means over whole measured stances: {each}."
     return how + (f" {reason}" if reason else "")
-
-
-def _too_small(estimate: Estimate, metrics: dict[str, Any], joints: list[Joint]) -> set[tuple[str, str]]:
-    """(stem, quantity) whose larger side is a small part of the body's largest."""
-    values, moments = estimate.values("coordinates"), measured_moments(estimate.data)
-    sizes: dict[str, dict[str, float]] = {"range": {}, "peak_moment": {}, "positive_work": {}, "negative_work": {}}
-    for joint in joints:
-        columns = list(joint.columns.values())
-        sizes["range"][joint.stem] = max(float(np.ptp(values[:, k])) for k in columns)
-        sizes["peak_moment"][joint.stem] = max(float(np.nanmax(np.abs(moments[:, k]), initial=0.0)) for k in columns)
-        for key, entry in (("positive_work", "positive_j"), ("negative_work", "negative_j")):
-            each = [metrics["work"].get(_name(estimate, k), {}).get(entry) or 0.0 for k in columns]
-            sizes[key][joint.stem] = max(abs(value) for value in each)
-    return {
-        (stem, key)
-        for key, every in sizes.items()
-        for stem, value in every.items()
-        if value < _NOT_MEANT * max(every.values(), default=0.0)
-    }
 
 
 def _percent(value: float | None, small: bool = False) -> str:

@@ -125,7 +125,7 @@ def write_sources(path: Path, title: str, estimate: Estimate, names: list[str], 
 
 
 def write_deviations(estimate: Estimate, path: Path) -> None:
-    """``uncertainty.sto``: one standard deviation of all that the other motion files hold.
+    """``uncertainty.sto``: standard deviations of the motion, moments, the wrench and the feet's forces.
 
     Columns ``NAME``, ``NAME_speed``, ``NAME_acceleration`` in degrees or metres (a second, a second squared), moments
     as in ``moments.sto``, ``fx`` ... ``mz`` in N and N m, the feet's forces (``ground_force_r_vx`` ...) in N; what an

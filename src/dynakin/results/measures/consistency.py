@@ -24,7 +24,9 @@ from dynakin.recordings.times import step_of
 from dynakin.results.naming import listed
 
 Judgement = Literal["overconfident", "consistent", "conservative"]
-NoiseFrom = Literal["declared", "calibrated"]
+NoiseFrom = Literal["declared", "calibrated", "given"]
+"""Scales as declared, found by this recording, or given (by a preset of another recording, or a hand); those that were
+given have the limits of those that were found."""
 
 SD_OVER_ERROR = (0.5, 2.5)
 """Standard deviations over errors that are called consistent: what a laboratory can plan with. Below, overconfident."""
@@ -128,10 +130,12 @@ def consistency(
 
 
 def noise_from(config: Mapping[str, Any]) -> NoiseFrom:
-    """Of a run's settings: calibrated where the scales used were found, by this recording or by that of its preset."""
-    scales = config.get("noise_used") or {}
-    neutral = scales.get("variance_scale", 1.0) == 1.0 and not scales.get("jerk_scale")
-    return "declared" if neutral else "calibrated"
+    """Of a run's settings: where the scales that it used are from."""
+    used, asked = (config.get(name) or {} for name in ("noise_used", "noise"))
+    scales, given = ((own.get("variance_scale", 1.0), own.get("jerk_scale") or {}) for own in (used, asked))
+    if scales == (1.0, {}):
+        return "declared"
+    return "given" if scales == given else "calibrated"
 
 
 def statistics_of(
@@ -181,7 +185,7 @@ def limits() -> dict[NoiseFrom, dict[str, Limits]]:
     return {
         noise: {
             group: Limits(*(Limit(row[word]["statistic"], row[word]["value"]) for word in Limits._fields))
-            for group, row in content[noise].items()
+            for group, row in content["declared" if noise == "declared" else "calibrated"].items()
         }
         for noise in get_args(NoiseFrom)
     }

@@ -39,8 +39,9 @@ class Signal:
 class MeanCurve:
     """One quantity by one method over the repetitions of one side.
 
-    side: "both" (squats), "left" or "right". n, mean, sd: (101,) at `PERCENT`; n repetitions of ``of`` are known there;
-    of a moment or a force only those count that are measured in every frame. sd: the sample's, NaN below two.
+    side: "both" (squats), "left" or "right". n, mean, sd: (101,) at `PERCENT`; n repetitions of ``of`` are known there,
+    of a coordinate with a deviation; of a moment or a force only those count that are measured in every frame. sd: the
+    sample's, NaN below two.
     mean_per_kg, sd_per_kg: over the body mass; None for coordinates, which have no such.
     """
 
@@ -152,8 +153,7 @@ def estimate_curves(estimate: Estimate) -> list[MeanCurve]:
     estimate = facing(estimate)
     preset = estimate.config.get("preset")
     data = estimate.data
-    coordinates = values_of(data, "coordinates")
-    own = (coordinates, measured_moments(data), measured_wrench(data))
+    own = (estimate.known("coordinates"), measured_moments(data), measured_wrench(data))
     names, rotation = estimate.coordinate_names, estimate.is_rotation()
     methods = {
         f"EKF ({preset})" if preset else "EKF": signals(names, rotation, *own),

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
 from dynakin.results.measures.feet import foot_sources
-from dynakin.results.measures.power import work_of
+from dynakin.results.measures.power import work, work_of
 from dynakin.results.measures.stances import compared_stances
 
 Array = npt.NDArray[np.float64]
@@ -49,11 +49,12 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
 
     Returns:
         ``coordinates``: by name without side, of the range of motion, the largest moment (absolute), positive and
-        negative work. ``feet``: of the largest vertical force and of the impulse, where the feet's wrenches are known.
+        negative work. ``small``: by name those whose sides are both next to nothing, so that the ratio says little.
+        ``feet``: of the largest vertical force and of the impulse, where the feet's wrenches are known.
         ``stances``: how many of each foot were compared, None where the window was. ``reason``: why legs are not.
     """
     time = estimate.time
-    angles = estimate.values("coordinates")[window]
+    angles = estimate.known("coordinates")[window]
     moments = sources.measured_moments(estimate.data)
     power = sources.measured_only(estimate.powers(), sources.moment_sources(estimate.data))
     stances, legs = compared_stances(estimate, window), sources.legs_of(estimate.data)
@@ -80,10 +81,37 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
     return {
         "what": WHAT,
         "coordinates": found,
+        "small": _small(estimate, window, list(found)),
         "feet": feet,
         "stances": None if stances is None else {foot: len(own) for foot, own in stances.items()},
         "reason": _reason(estimate, stances, window),
     }
+
+
+NOT_MEANT = 0.02
+"""Below this share of the largest of its kind a quantity is too small for a ratio of the sides to say anything."""
+
+
+def _small(estimate: Estimate, window: npt.NDArray[np.bool_], stems: Sequence[str]) -> dict[str, list[str]]:
+    """By stem, the quantities whose larger side is a small part (`NOT_MEANT`) of the largest of all."""
+    names, done = estimate.coordinate_names, work(estimate, window)
+    angles, moments = estimate.known("coordinates")[window], sources.measured_moments(estimate.data)[window]
+
+    def size(key: str, name: str) -> float:
+        k = names.index(name)
+        if key == "range":
+            return float(np.nan_to_num(_range(angles[:, k])))
+        if key == "peak_moment":
+            return float(np.nanmax(np.abs(moments[:, k]), initial=0.0))
+        return abs(done.get(name, {}).get(f"{key.removesuffix('_work')}_j") or 0.0)
+
+    small: dict[str, list[str]] = {stem: [] for stem in stems}
+    for key in ("range", "peak_moment", "positive_work", "negative_work"):
+        sizes = {stem: max(size(key, f"{stem}_r"), size(key, f"{stem}_l")) for stem in stems}
+        for stem, value in sizes.items():
+            if value < NOT_MEANT * max(sizes.values()):
+                small[stem].append(key)
+    return {stem: keys for stem, keys in small.items() if keys}
 
 
 def _reason(estimate: Estimate, stances: dict[str, list[slice]] | None, window: npt.NDArray[np.bool_]) -> str | None:
@@ -126,8 +154,8 @@ def _mean(of: Callable[..., float], values: Array, parts: Sequence[slice], *alon
 
 
 def _range(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.ptp(known)) if len(known) else float("nan")
+    """NaN where not all is known: what is missing may hold the largest or the smallest."""
+    return float(np.ptp(values))
 
 
 def _largest(values: Array) -> float:
