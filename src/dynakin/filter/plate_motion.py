@@ -40,10 +40,11 @@ LEAST_S = 0.016
 """A lesser delay is left to `plate_clock`: skin and the model do as much to the centre of mass' acceleration.
 Recordings in step have their minimum at 0 to 6 ms (real, but for one at 15), walks of `truth3d` with joints found from
 markers 5 to 10 ms later than their plates are."""
-LONGEST_LEGS_S, LEAST_LEGS_S, COARSE_LEGS_S = 0.15, 0.025, 0.01
+LONGEST_LEGS_S, LEAST_LEGS_S, COARSE_LEGS_S = 0.15, 0.025, 0.015
 """The same of a body whose trunk no marker shows, by the vertical force alone: it needs no lean, and the trunk goes up
 and down with the pelvis. In step the minimum lies at 0 to 10 ms in 8 simulated walks and squats and 4 real recordings
-without their trunks' markers, at -10 in one whose whole body says 9, at 10 to 20 in 3 that have no others."""
+without their trunks' markers, at -10 in one whose whole body says 9, at 10 to 20 in 3 that have no others, at -31 to 5
+in `truth3d`'s. What is less, and what is then left, `plate_clock` finds."""
 WIDE_S, EVIDENT, APART, WIDE_JUDGED_S = 0.5, 0.4, 1.5, 1.0
 """Where the force fits best at the end of that range, or nowhere in it, longer delays are looked for. One is believed
 where its misfit is so much less than in step (0.09 to 0.12 of walks that were moved by 0.1 to 0.3 s), no delay more
@@ -163,19 +164,6 @@ def _fitting(needed: Needed, found: _Misfits, less: float) -> Delay | None:
     if abs(delay) < shortest or least > less * now or least > NEAR * needed.weight:
         return None
     return Delay(delay, sd_s) if found.judged_s[k] > KEPT * found.judged_s[len(found.delay) // 2] else None
-
-
-def hides_clock(needed: Needed, force: Array) -> bool:
-    """Whether a body without its trunk's markers moves, and yet no delay of its plates would be found."""
-    known = needed.judged(force)
-    if needed.whole or not needed.judged_s(force) >= _SHORTEST_S:
-        return False
-    if force[known, 1].std() < VIGOROUS * needed.weight:
-        return False
-    misfits = _misfits(needed, force, LONGEST_LEGS_S).misfit
-    middle, by = len(misfits) // 2, round(2.0 * LEAST_LEGS_S / STEP_S)
-    least, aside = misfits.min(), min(misfits[middle - by], misfits[middle + by])
-    return bool(least > LESS * aside or least > NEAR * needed.weight)
 
 
 class _Misfits(NamedTuple):

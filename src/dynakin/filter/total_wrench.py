@@ -12,14 +12,13 @@ from dynakin.errors import RecordingError
 from dynakin.filter.carried import carried_in_hands, carried_in_words
 from dynakin.filter.declared import may_bear, plate_of_its_own
 from dynakin.filter.expected import ContactPaths
-from dynakin.filter.plate_clock import Delay, clock_delay
+from dynakin.filter.plate_clock import UNKNOWN_S, Delay, clock_delay
 from dynakin.filter.plate_gain import NO_GAINS, found_gains
 from dynakin.filter.plate_motion import (
     Needed,
     brought_into_step,
     drift_in_words,
     fitting_rate,
-    hides_clock,
     out_of_step_in_words,
     plates_delay,
     turned_axes,
@@ -42,11 +41,12 @@ from dynakin.recordings.recording import Recording
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-CLOCK_HIDDEN = "Not all of the body is marked: this movement does not show whether plates and markers are in step."
 CLOCK_UNKNOWN = (
     "Whether plates and markers are in step within some milliseconds is not known here: it takes half a second of a "
-    "movement in which the plates carry all of the person, never more than twice the weight, and no declared contact."
+    "movement in which the plates carry all of the person, never more than twice the weight, and no declared contact. "
+    "Deviations of moments hold a few."
 )
+CLOCK_OF_LEGS = ", which may be none: not all of the body is marked. Deviations of moments hold it."
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +63,8 @@ class Ground:
         shear: by how much the plates' horizontal forces are off.
         off_gain: (T, F) part of its load by which the plate under each foot may be off; None: nothing contradicts it.
         notes: what there is to say. reasons: those of them that say why something is not measured.
-        behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how well that
-            is known, where they were.
+        behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how far they
+            may be out of it still; 0: no farther than usual.
     """
 
     loads: FootLoads | None
@@ -100,15 +100,21 @@ def known_ground(
         RecordingError: the plates are refused.
     """
     ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance)
-    left = None
-    if ground.loads is not None:
-        left = clock_delay(initial, recording.time, markers, known, drifts=not about(ground.notes, "carried"))
-    if left is None and ground.loads is not None and ground.usable and not ground.behind_s and not initial.unseen_kg:
-        ground = replace(ground, notes=(*ground.notes, note("sum of the plates", CLOCK_UNKNOWN)))
-    if left is None or not left.worth_it:  # the coarse search's deviation gives way to the finer one's
-        return (replace(ground, clock_sd_s=left.sd_s) if left is not None and ground.behind_s else ground), known
-    delay = left._replace(delay_s=ground.behind_s + left.delay_s)
-    return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
+    if ground.loads is None or not ground.loads.on.any():
+        return ground, known
+    whole = not initial.unseen_kg
+    left = clock_delay(initial, recording.time, markers, known, drifts=not about(ground.notes, "carried"))
+    if left is not None and left.worth_it(whole):
+        delay = left._replace(delay_s=ground.behind_s + left.delay_s)
+        return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
+    if left is None:
+        said = () if ground.behind_s else (note("sum of the plates", CLOCK_UNKNOWN),)
+        return replace(ground, notes=(*ground.notes, *said), clock_sd_s=ground.clock_sd_s or UNKNOWN_S), known
+    if whole:  # the coarse search's deviation gives way to the finer one's
+        return (replace(ground, clock_sd_s=left.sd_s) if ground.behind_s else ground), known
+    said = () if ground.behind_s else (note("sum of the plates", f"{out_of_step_in_words(left)}{CLOCK_OF_LEGS}"),)
+    may_be = float(np.hypot(left.delay_s, left.sd_s))
+    return replace(ground, notes=(*ground.notes, *said), clock_sd_s=may_be), known
 
 
 def _known_ground(
@@ -169,8 +175,6 @@ def _known_ground(
         delay = None if in_step else plates_delay(needed.vertically() if shear.unmeasured else needed, total)
         if delay is not None:
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
-        if not in_step and hides_clock(needed, total):
-            by_motion.append(note("sum of the plates", CLOCK_HIDDEN))
         found = None if initial.contacts else fitting_rate(needed, total)
         if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
             by_motion.append(warning("rate", wrong_rate_in_words(needed.rate, *found)))
