@@ -201,12 +201,22 @@ def drift_in_words(delay: Delay, time: Array) -> str:
     )
 
 
+def apart_in_words(delay: Delay, plates: Sequence[str]) -> str:
+    """Which plates (P,) have a clock of their own, and how far the others lag."""
+    ms = [1000.0 * more for more in delay.apart]
+    own = [f"{name} is {abs(by):.0f} ms {_where(by)} the others" for name, by in zip(plates, ms, strict=True) if by]
+    others = clock_in_words(delay.delay_s, delay.sd_s).replace("the plates are", "those are", 1)
+    return f"By the motion the plates have not one clock: {listed(own)}; {others}"
+
+
 def clock_in_words(delay_s: float, sd_s: float) -> str:
     """How far the plates lag behind the markers, or run ahead of them."""
-    where = "behind" if delay_s >= 0.0 else "ahead of"
-    return (
-        f"the plates are {1000.0 * abs(delay_s):.1f} ms {where} the markers (standard deviation {1000.0 * sd_s:.1f} ms)"
-    )
+    how_well = f"(standard deviation {1000.0 * sd_s:.1f} ms)"
+    return f"the plates are {1000.0 * abs(delay_s):.1f} ms {_where(delay_s)} the markers {how_well}"
+
+
+def _where(delay: float) -> str:
+    return "behind" if delay >= 0.0 else "ahead of"
 
 
 def fitting_rate(needed: Needed, force: Array) -> tuple[float, float] | None:
@@ -243,16 +253,16 @@ def wrong_rate_in_words(rate: float, fitting: float, slope: float) -> str:
     )
 
 
-def brought_into_step(recording: Recording, delay_s: float | Array) -> Recording:
-    """The recording with what its plates say so much later, one or (T,), at each time; not known (NaN) where they end
-    before."""
+def brought_into_step(recording: Recording, delay_s: float | Array, apart: Sequence[float] = ()) -> Recording:
+    """The recording with what its plates say so much later, one or (T,), at each time, each (P,) so much more that is
+    ``apart``; not known (NaN) where they end before."""
 
-    def of(plate: Plate) -> Plate:
+    def of(plate: Plate, more: float) -> Plate:
         values = (plate.force, plate.moment, plate.cop, plate.free_moment)
-        force, moment, cop, free = (_later(recording.time, each, delay_s) for each in values)
+        force, moment, cop, free = (_later(recording.time, each, delay_s + more) for each in values)
         return replace(plate, force=force, moment=moment, cop=cop, free_moment=free)
 
-    return recording.with_plates(tuple(of(plate) for plate in recording.plates))
+    return recording.with_plates(tuple(map(of, recording.plates, apart or [0.0] * len(recording.plates))))
 
 
 def _later(time: Array, values: Array, delay_s: float | Array) -> Array:

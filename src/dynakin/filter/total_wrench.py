@@ -16,6 +16,7 @@ from dynakin.filter.plate_clock import UNKNOWN_S, Delay, clock_delay
 from dynakin.filter.plate_gain import NO_GAINS, found_gains
 from dynakin.filter.plate_motion import (
     Needed,
+    apart_in_words,
     brought_into_step,
     drift_in_words,
     fitting_rate,
@@ -46,6 +47,9 @@ CLOCK_UNKNOWN = (
     "movement in which the plates carry all of the person, never more than twice the weight, and no declared contact. "
     "Deviations of moments hold a few."
 )
+ROUNDS = 3
+"""Once single plates are in step, more frames may be known, and others are found not to be; what a body that is not
+marked whole shows is drawn towards none, and farther off than the fine search reaches."""
 CLOCK_OF_LEGS = ", which may be none: not all of the body is marked. Deviations of moments hold it."
 
 
@@ -102,11 +106,22 @@ def known_ground(
     ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance)
     if ground.loads is None or not ground.loads.on.any():
         return ground, known
-    whole = not initial.unseen_kg
-    left = clock_delay(initial, recording.time, markers, known, drifts=not about(ground.notes, "carried"))
-    if left is not None and left.worth_it(whole):
-        delay = left._replace(delay_s=ground.behind_s + left.delay_s)
-        return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
+    whole, moved = not initial.unseen_kg, Delay(ground.behind_s, 0.0)
+    for _ in range(ROUNDS):
+        plates = _moved(recording, moved).plates
+        each = np.stack([initial.ground.wrench_to_ground(plate.wrench) for plate in plates])
+        left = clock_delay(initial, recording.time, markers, known, not about(ground.notes, "carried"), each)
+        if left is None or not left.worth_it(whole or bool(moved.delay_s)):  # what was found coarsely is known worse
+            break
+        moved = left.after(moved)
+        ground, known = _brought_into_step(recording, initial, markers, moved, assigned, tolerance)
+        if whole and not left.apart:
+            return ground, known
+    if moved.sd_s and moved.worth_it(whole):
+        return ground, known
+    if moved.sd_s:  # the coarse search had it out of step
+        left = moved
+        ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance, in_step=True)
     if left is None:
         said = () if ground.behind_s else (note("sum of the plates", CLOCK_UNKNOWN),)
         return replace(ground, notes=(*ground.notes, *said), clock_sd_s=ground.clock_sd_s or UNKNOWN_S), known
@@ -268,6 +283,11 @@ def _light_feet(before: FootLoads, loads: FootLoads, beyond: Flags) -> list[Mess
     return found
 
 
+def _moved(recording: Recording, delay: Delay) -> Recording:
+    lags = delay.lags(recording.time) if delay.drift else delay.delay_s
+    return brought_into_step(recording, lags, delay.apart) if delay.worth_it(True) else recording
+
+
 def _brought_into_step(
     recording: Recording,
     initial: CalibratedModel,
@@ -277,14 +297,18 @@ def _brought_into_step(
     tolerance: float | None,
 ) -> tuple[Ground, Array]:
     """`known_ground` of what the plates say so much later, with a sentence on it."""
-    there = brought_into_step(recording, delay.lags(recording.time) if delay.drift else delay.delay_s)
+    there = _moved(recording, delay)
     wrench = initial.ground.wrench_to_ground(there.total_wrench())
     ground, known = _known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
     found = drift_in_words(delay, recording.time) if delay.drift else out_of_step_in_words(delay)
+    if delay.apart:
+        found = apart_in_words(delay, [plate.name for plate in recording.plates])
     words = f"{found}; they were brought into step."
     said = note("in step", words)
     if delay.drift:
         said = warning("rate", f"{words} Correct the rate, or the times, in the file that is wrong.")
+    elif delay.apart:
+        said = warning("in step", f"{words} Synchronise the plates with each other.")
     elif initial.unseen_kg:
         said = warning(
             "in step", f"{words} Not all of the body is marked, so that no better is known: synchronise both."
