@@ -46,7 +46,7 @@ deviations at most. 3.7 to 9.8 and -2.2 to 7.3 in seeds 61 to 64, real ones with
 of the whole body 5)."""
 UNKNOWN_S = 0.007
 """How far out of step plates may be where nothing judges it: most are 2 ms, some 20. So late, `truth3d`'s walk over one
-plate (seed 1) has an ankle 2.4 to 2.8 of its deviations off; as it is, deviations are 1.1 to 1.7 times the errors."""
+plate (seed 1) has an ankle 2.4 to 2.7 of its deviations off; as it is, deviations are 1.1 to 1.7 times the errors."""
 FORCE, MOMENT_M = 0.033, 0.017
 """What motion and plates disagree on, parts of the weight (m for moments), at least: 20 N and 10 N m."""
 MASS, CENTRE_M, INERTIA, LEAST_INERTIA = 0.1, 0.02, 0.2, 1e-3
