@@ -117,6 +117,38 @@ def test_a_clock_that_is_faster_or_slower_is_found_and_plates_are_brought_into_s
     assert np.abs(ready.wrench[both] - before.wrench[both])[:, :3].mean() < 3.0
 
 
+def with_a_clock_of_its_own(recording: Recording, which: int, late_s: float) -> Recording:
+    """One plate later than the others; where it is not known by then it is as it was."""
+    late = brought_into_step(recording, -late_s).plates[which]
+    whole = recording.plates[which]
+    pairs = {name: (getattr(late, name), getattr(whole, name)) for name in ("force", "moment", "cop", "free_moment")}
+    own = replace(whole, **{name: np.where(np.isfinite(a), a, b) for name, (a, b) in pairs.items()})
+    return recording.with_plates(tuple(own if k == which else plate for k, plate in enumerate(recording.plates)))
+
+
+def test_one_plate_with_a_clock_of_its_own_is_named_and_brought_into_step() -> None:
+    """20 ms late: the mean delay put the others out of step, or looked like a drift."""
+    whole = simulate("fullbody", "gait", 7, 4.0).recording
+    before, late = person().prepare(whole), with_a_clock_of_its_own(whole, 1, 0.02)
+    ready = person().prepare(late)
+    (said,) = about(ready.messages, "in step")
+    assert said.level == "warning" and "plate 2 is" in said.text and said.text.count("the others") == 1
+    assert float(said.text.split("plate 2 is ")[1].split()[0]) == pytest.approx(20.0, abs=3.0)
+    assert not about(ready.messages, "rate") and abs(ready.ground.behind_s) < 0.004
+    both = np.isfinite(ready.wrench).all(axis=1) & np.isfinite(before.wrench).all(axis=1)
+    assert both.sum() > 0.8 * np.isfinite(before.wrench).all(axis=1).sum()
+    assert np.abs(ready.wrench[both] - before.wrench[both])[:, :3].mean() < 3.0
+
+
+def test_a_real_plate_with_a_clock_of_its_own_is_named(data_dir: Path) -> None:
+    folder = data_dir / "opencap_subject4"
+    walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    (note,) = about(person().prepare(walk).messages, "in step")
+    (said,) = about(person().prepare(with_a_clock_of_its_own(walk, 0, 0.02)).messages, "in step")
+    assert note.level == "note" and said.level == "warning"
+    assert "have not one clock" in said.text and "have not one clock" not in note.text
+
+
 def test_a_real_squat_shows_a_clock_that_drifts_and_none_that_does_not(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
     squats = dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
@@ -158,4 +190,4 @@ def test_short_gaps_hide_no_delay() -> None:
     lacking = clock_delay(ready.calibrated, recording.time[~gap], markers[~gap], wrench[~gap])
     assert found is not None and lacking is not None
     assert found.delay_s == pytest.approx(whole.delay_s, abs=0.0005)
-    assert lacking == pytest.approx(found, abs=1e-6)
+    assert lacking[:4] == pytest.approx(found[:4], abs=1e-6)

@@ -38,6 +38,15 @@ PRIOR_S = 0.01
 """How far out of step plates are that nobody complained of: a frame at 100 Hz."""
 MODEL_S = 0.002
 """What joints, skin and segments that are not rigid do besides: by `truth3d`'s walks 0.3 to 1.3 ms."""
+MODEL_LEGS_S, LEGS_SD = 0.005, 2.0
+"""The same of a body that is not marked whole, of which the vertical force alone is asked (an unseen trunk leans, and
+goes up and down with the pelvis); and a delay of fewer of its deviations is none. Chosen on `truth3d`'s seeds 1 to 4
+without their upper bodies' markers, whose plates are 2 ms late: 5.2 to 7.9 found in walks, -0.9 to 8.5 in squats, 1.6
+deviations at most. 3.7 to 9.8 and -2.2 to 7.3 in seeds 61 to 64, real ones within 1.6 deviations (`walking1` 12.6 and
+of the whole body 5)."""
+UNKNOWN_S = 0.007
+"""How far out of step plates may be where nothing judges it: most are 2 ms, some 20. So late, `truth3d`'s walk over one
+plate (seed 1) has an ankle 2.4 to 2.7 of its deviations off; as it is, deviations are 1.1 to 1.7 times the errors."""
 FORCE, MOMENT_M = 0.033, 0.017
 """What motion and plates disagree on, parts of the weight (m for moments), at least: 20 N and 10 N m."""
 MASS, CENTRE_M, INERTIA, LEAST_INERTIA = 0.1, 0.02, 0.2, 1e-3
@@ -55,6 +64,8 @@ frames themselves do not count."""
 LOADED, MOST_LOAD = 0.3, 2.0
 """Of the weight: mean of a stretch at least, and of the recording at most, because flesh follows a landing later than
 bones do: a drop jump fits its plates worse by the 5 to 8 ms that its calmer parts ask for."""
+UPWARDS = 1
+"""Of a wrench's components."""
 FRAMES_HZ = 100.0
 """Twice as many frames a second show no more."""
 WIDE_DRIFT = 0.02
@@ -66,6 +77,14 @@ DRIFT_SD, DRIFT_S = 4.0, 0.003
 a frame at 100 Hz). Chosen on `truth3d`'s seeds 1 to 4, squats of 8 s and walks of 3.3 s: up to 0.13 % and 1.3 of its
 deviations, which are 0.1 % in walks and 0.15 to 0.19 % in squats; 55 other trials, real and simulated, which did not
 choose, stay within 1.9 of them."""
+APART_S, APART_SD, APART_COST = 0.006, 4.0, 12.0
+"""A plate whose own delay is so much from the others' and so many of its standard deviations has a clock of its own,
+where the sum of squares (of the noise's) is so much less than of one clock. Chosen on `truth3d`'s walks of seeds 1 to
+4: 95 to 600 less where one plate of seven, two or all of one foot are 20 ms late, at most 6 as they are, as in seeds 61
+to 64; and on two real walks, 18 and more so moved; real recordings as they are, which did not choose, at most 3."""
+BETTER_COST = 10.0
+"""And so much less than of a clock that drifts, which then does not: two plates of eight that are 20 ms late look like
+a drift of 2 %, and leave 40 to 65 less; of drifts of 1 and 2 % plates' own delays leave 9 to 70 more."""
 DRIFT_LEFT = 1.0
 """And none where motion and plates then disagree by more than the noise: 0.03 to 0.65 of its variance are left in these
 trials. Who squats with 10 kg in the hands leaves 0.9 and looks like a drift of 0.8 %, so that nobody asks then."""
@@ -73,21 +92,27 @@ trials. Who squats with 10 kg in the hands leaves 0.9 and looks like a drift of 
 
 class Delay(NamedTuple):
     """By how much plates lag behind the markers, s, and its standard deviation: in the middle of a recording where they
-    lag ``drift`` seconds more each second, as plates do whose clock is faster by that part."""
+    lag ``drift`` seconds more each second, as plates do whose clock is faster by that part; and each plate (P,) lags so
+    much more that is ``apart``, where they have not one clock."""
 
     delay_s: float
     sd_s: float
     drift: float = 0.0
     drift_sd: float = 0.0
+    apart: tuple[float, ...] = ()
 
     def lags(self, time: Array) -> Array:
         """(T,) s, at the times (T,) s of the recording."""
         return np.asarray(self.delay_s + self.drift * (time - 0.5 * (time[0] + time[-1])))
 
-    @property
-    def worth_it(self) -> bool:
-        """Whether it is worth bringing the plates into step."""
-        return bool(self.drift) or self.beyond(LEAST_S, LEAST_SD)
+    def after(self, other: Delay) -> Delay:
+        """Of plates that were brought into step by another."""
+        apart = np.add(self.apart or 0.0, other.apart or 0.0) if self.apart or other.apart else np.zeros(0)
+        return self._replace(delay_s=self.delay_s + other.delay_s, apart=tuple(apart.tolist()))
+
+    def worth_it(self, whole: bool) -> bool:
+        """Whether it is worth bringing the plates into step, of a body that is marked whole or not."""
+        return bool(self.drift or self.apart) or self.beyond(LEAST_S, LEAST_SD if whole else LEGS_SD)
 
     def beyond(self, least_s: float, sigmas: float) -> bool:
         """Whether it is longer than so much, and than so many of its standard deviations."""
@@ -95,17 +120,22 @@ class Delay(NamedTuple):
 
 
 def clock_delay(
-    initial: CalibratedModel, time: Array, markers: Array, wrench: Array, drifts: bool = True
+    initial: CalibratedModel,
+    time: Array,
+    markers: Array,
+    wrench: Array,
+    drifts: bool = True,
+    plates: Array | None = None,
 ) -> Delay | None:
-    """The plates' delay; None where nothing can be said.
+    """The plates' delay; None where nothing can be said. Of a body that is not marked whole by the vertical force.
 
     Args:
         markers: (T, M, 3) m, of the model, ground frame; NaN: not seen. wrench: (T, 6) N and N m of all plates, about
             the ground's origin, where that is all that bears the person; NaN elsewhere.
-        drifts: whether the clock may be faster or slower than the markers'.
+        drifts: whether the clock may be faster or slower than the markers', or each plate (P, T, 6) may have its own.
     """
     rate, weight = rate_of(time), initial.weighed_kg * GRAVITY_M_S2
-    if initial.contacts or initial.unseen_kg or not rate >= 4.0 * CUTOFF_HZ:
+    if initial.contacts or not rate >= 4.0 * CUTOFF_HZ:
         return None
     if (wrench[:, 1] > MOST_LOAD * weight).any():
         return None
@@ -117,74 +147,138 @@ def clock_delay(
     stretches, ends = (find(shown, rate, LOADED * weight) for find in (_stretches, _at_the_ends))
     if not stretches:
         return None
-    body = _Body(initial)
+    body, asked = _Body(initial), [UPWARDS] if initial.unseen_kg else list(range(6))
 
     def moved(parts: list[slice]) -> list[tuple[slice, _Needed]]:
-        return [(part, body.needed(markers[part], seen[part], rate / part.step)) for part in parts]
+        return [(part, body.needed(markers[part], seen[part], rate / part.step, asked)) for part in parts]
 
     judged = moved(stretches)
-    noise = weight * np.repeat([FORCE, MOMENT_M], 3)
-    prior_sd = np.concatenate([[0.0, WIDE_S], body.inertia_sd, OFFSET * noise])
-    delay, variance = 0.0, np.inf
+    noise = weight * np.repeat([FORCE, MOMENT_M], 3)[asked]
+    prior_sd = np.concatenate([body.inertia_sd, OFFSET * noise])
+    delay, variance, drifting, several = 0.0, np.inf, None, None
     for _ in range(PASSES):
         there = in_step(time, wrench, delay)
-        (_, step), (_, variance), _ = _step(judged, there, noise, prior_sd)
-        delay = float(np.clip(delay + step, -WIDE_S, WIDE_S))
-    drifting = _drift(time, wrench, moved(ends) if ends else judged, noise, prior_sd) if drifts else None
-    variance += MODEL_S**2
+        found = _step(judged, there, noise, prior_sd, [_Lag(there, WIDE_S)])
+        delay, variance = float(np.clip(delay + found.step[0], -WIDE_S, WIDE_S)), float(found.variance[0])
+    if drifts and not initial.unseen_kg:
+        judged = moved(ends) if ends else judged
+        drifting, cost = _drift(time, wrench, judged, noise, prior_sd)
+        each = [on_grid(numbers, np.nan_to_num(plate)) for plate in ([] if plates is None else plates)]
+        several = _apart(time, each, judged, noise, prior_sd, cost) if len(each) > 1 else None
+    if several is not None:
+        drifting, delay, variance = None, several.delay_s, several.sd_s**2
+    variance += (MODEL_LEGS_S if initial.unseen_kg else MODEL_S) ** 2
     trust = PRIOR_S**2 / (PRIOR_S**2 + variance)
     if drifting is not None:
         return drifting._replace(sd_s=float(np.sqrt(trust * variance)))
-    return Delay(trust * delay, float(np.sqrt(trust * variance)))
+    return Delay(trust * delay, float(np.sqrt(trust * variance)), apart=several.apart if several else ())
 
 
 def _drift(
     time: Array, wrench: Array, judged: list[tuple[slice, _Needed]], noise: Array, prior_sd: Array
-) -> Delay | None:
-    """A delay that changes evenly with time; None where that is not to be told from one that does not.
+) -> tuple[Delay | None, float]:
+    """A delay that changes evenly with time, None where that is not to be told from one that does not; and its cost.
 
     Args:
-        wrench: (T, 6). prior_sd: of what `_Needed.equations` ask for.
+        wrench: (T, 6). prior_sd: of what `_Needed.equations` ask for beside delays.
     """
     known = np.flatnonzero(np.isfinite(wrench).all(axis=1))
     led = np.stack([np.interp(time, time[known], column[known]) for column in wrench.T], axis=1)
-    wide = np.concatenate([[WIDE_DRIFT], prior_sd[1:]])
     middle, half = 0.5 * (time[0] + time[-1]), 0.5 * (time[-1] - time[0])
     delay = drift = 0.0
     for _ in range(DRIFT_PASSES):
         there = in_step(time, led, Delay(delay, 0.0, drift).lags(time))
-        (faster, step), (variance, _), left = _step(judged, there, noise, wide, time - middle)
-        delay, drift = delay + step, drift + faster
-    if left > DRIFT_LEFT or abs(drift) < max(DRIFT_S / half, DRIFT_SD * float(np.sqrt(variance))):
+        lags = [_Lag(there, WIDE_S), _Lag(there, WIDE_DRIFT, time - middle)]
+        found = _step(judged, there, noise, prior_sd, lags)
+        delay, drift = delay + float(found.step[0]), drift + float(found.step[1])
+    sd = float(np.sqrt(found.variance[1]))
+    evident = found.left <= DRIFT_LEFT and abs(drift) >= max(DRIFT_S / half, DRIFT_SD * sd)
+    return (Delay(delay, 0.0, drift, sd) if evident else None), found.cost
+
+
+def _apart(
+    time: Array,
+    plates: list[Array],
+    judged: list[tuple[slice, _Needed]],
+    noise: Array,
+    prior_sd: Array,
+    drifting: float,
+) -> Delay | None:
+    """The delay of most plates (T, 6), and how much more others lag; None where one clock, or one that drifts (which
+    costs so much), explains them."""
+
+    def found(groups: list[Array]) -> tuple[Array, _Step]:
+        lag = np.zeros(len(groups))
+        for _ in range(DRIFT_PASSES):
+            there = [in_step(time, group, by) for group, by in zip(groups, lag, strict=True)]
+            step = _step(judged, np.sum(there, axis=0), noise, prior_sd, [_Lag(group, WIDE_S) for group in there])
+            lag = lag + step.step
+        return lag, step
+
+    (_, together), (lag, each) = found([np.sum(plates, axis=0)]), found(plates)
+    spread = max(1.0, each.left)
+    if each.cost > min(together.cost - APART_COST * spread, drifting - BETTER_COST * spread):
         return None
-    return Delay(float(delay), 0.0, float(drift), float(np.sqrt(variance)))
+    order, known = np.argsort(lag), 1.0 / each.variance
+    usual = lag[order[np.searchsorted(np.cumsum(known[order]), 0.5 * known.sum())]]
+    own = np.abs(lag - usual) > np.maximum(APART_S, APART_SD * np.sqrt(each.variance))
+    if not own.any():
+        return None
+    known[own] = 0.0
+    delay = float(known @ lag / known.sum())
+    return Delay(delay, float(known.sum() ** -0.5), apart=tuple(np.where(own, lag - delay, 0.0).tolist()))
+
+
+class _Lag(NamedTuple):
+    """What of the plates (T, 6) lags, how far at most (s, or a part of time), and how many times so at times (T,)."""
+
+    of: Array
+    wide: float
+    times: Array | float = 1.0
+
+
+class _Step(NamedTuple):
+    """By how much more each of n lags (n,), the variance of that, the mean square of what is left over, of the noise's,
+    and the cost: the sum of squares that is least."""
+
+    step: Array
+    variance: Array
+    left: float
+    cost: float
 
 
 class _Needed(NamedTuple):
     """What a stretch of the motion needs: wrench (T, 6) about the ground's origin, and its derivatives (T, 6, I) by
-    inertia; both low-passed; and the frames (T,) that count."""
+    inertia; both low-passed; the frames (T,) that count, and which C components are asked."""
 
     wrench: Array
     by_inertia: Array
     seen: Flags
     rate: float
+    asked: list[int]
 
-    def equations(self, plates: Array, noise: Array, since: Array) -> tuple[Array, Array]:
-        """Rows H (6 N, 2 + I + 6) and values (6 N,), over their noise (6,), of how plates (T, 6) differ from it by a
-        drift, whose delay is none at times since (T,) s of zero, a delay, inertia and a constant; moments about the
-        mean centre of pressure."""
-        measured = low_pass(plates, self.rate, CUTOFF_HZ)
+    def equations(self, part: slice, plates: Array, noise: Array, lags: list[_Lag]) -> tuple[Array, Array]:
+        """Rows H (C N, n + I + C) and values (C N,), over their noise (C,), of how plates (T, 6) differ from it in its
+        ``part`` of the recording by n lags, inertia and a constant; moments about the mean centre of pressure."""
+        measured = low_pass(plates[part], self.rate, CUTOFF_HZ)
         load = measured.mean(axis=0)
         centre = np.array([load[5], 0.0, -load[3]]) / load[1]
         end = round(END_S * self.rate)
         inner = self.seen.copy()
-        inner[:end] = inner[len(plates) - end :] = False
-        differs = wrench_about(measured - self.wrench, centre)[inner] / noise
-        later = wrench_about(-np.gradient(measured, 1.0 / self.rate, axis=0), centre)[inner] / noise
-        bodies = wrench_about(self.by_inertia.swapaxes(1, 2), centre)[inner] / noise  # (N, I, 6)
-        constant = np.broadcast_to(np.diag(1.0 / noise), (len(differs), 6, 6))
-        more = later * since[inner, None]
-        H = np.concatenate([np.stack([more, later], axis=2), bodies.swapaxes(1, 2), constant], axis=2)
+        inner[:end] = inner[len(inner) - end :] = False
+
+        def of(wrenches: Array) -> Array:
+            return wrench_about(wrenches, centre)[inner][..., self.asked] / noise
+
+        def later(lag: _Lag) -> Array:
+            change = np.gradient(low_pass(lag.of[part], self.rate, CUTOFF_HZ), 1.0 / self.rate, axis=0)
+            times = lag.times if isinstance(lag.times, float) else lag.times[part, None]
+            return of(-change * times)
+
+        differs, delayed = of(measured - self.wrench), np.stack([later(lag) for lag in lags], axis=2)
+        bodies = of(self.by_inertia.swapaxes(1, 2))  # (N, I, C)
+        constant = np.broadcast_to(np.diag(1.0 / noise), (len(differs), len(noise), len(noise)))
+        H = np.concatenate([delayed, bodies.swapaxes(1, 2), constant], axis=2)
         return H.reshape(-1, H.shape[2]), differs.reshape(-1)
 
 
@@ -204,7 +298,7 @@ class _Body:
         known = [_unsure(np.array(segment.inertia)) for segment in segments if segment.inertia[0] > 0.0]
         self.inertia_sd = np.concatenate(known)
 
-    def needed(self, markers: Array, seen: Flags, rate: float) -> _Needed:
+    def needed(self, markers: Array, seen: Flags, rate: float, asked: list[int]) -> _Needed:
         """Of a stretch of markers (T, M, 3), which show enough in most of its frames (T,)."""
         posed = inverse_kinematics(self._initial, markers[seen])
         q = _through(np.flatnonzero(seen), posed, np.arange(len(markers))) if not seen.all() else posed
@@ -217,7 +311,7 @@ class _Body:
             x[: len(moving)] = moving
             wrench[k] = _core.wrench(self._model, x)
             by_inertia[k] = _core.wrench_jacobian(self._model, x)[:, self._inertia]
-        return _Needed(wrench, by_inertia, seen, rate)
+        return _Needed(wrench, by_inertia, seen, rate, asked)
 
 
 def _even_time(time: Array, numbers: npt.NDArray[np.intp]) -> Array:
@@ -282,26 +376,24 @@ def _stretches(wrench: Array, rate: float, least_n: float, longest_s: float = LO
     return chosen
 
 
-def _step(
-    judged: list[tuple[slice, _Needed]], plates: Array, noise: Array, prior_sd: Array, since: Array | None = None
-) -> tuple[Array, Array, float]:
-    """Drift and delay, (2,) each: by how much more the plates (T, 6) are off, and the variances of that; and the mean
-    square of what is left over, of the noise's. By least squares with priors over stretches of the recording, each row
-    of which counts as so much of one as its low-pass leaves; what is left that is more than the noise counts as noise.
-
-    Args:
-        since: (T,) s, as for `_Needed.equations`; not given: no drift is asked for.
-    """
-    since = np.zeros(len(plates)) if since is None else since
-    equations = [need.equations(plates[part], noise, since[part]) for part, need in judged]
+def _step(judged: list[tuple[slice, _Needed]], plates: Array, noise: Array, prior_sd: Array, lags: list[_Lag]) -> _Step:
+    """How much more plates (T, 6) are off. By least squares with priors over stretches of the recording, each row of
+    which counts as so much of one as its low-pass leaves; what is left that is more than the noise counts as noise."""
+    equations = [need.equations(part, plates, noise, lags) for part, need in judged]
     H, values = (np.concatenate(each) for each in zip(*equations, strict=True))
-    counts = min(2.0 * CUTOFF_HZ / judged[0][1].rate, 1.0)
+    counts, n, prior_sd = (
+        min(2.0 * CUTOFF_HZ / judged[0][1].rate, 1.0),
+        len(lags),
+        np.r_[[lag.wide for lag in lags], prior_sd],
+    )
     scaled = H * prior_sd
     factor = cho_factor(counts * scaled.T @ scaled + np.eye(len(prior_sd)))
     z = cho_solve(factor, counts * scaled.T @ values)
-    left = float(np.mean(np.square(values - scaled @ z)))
-    variances = np.diag(cho_solve(factor, np.eye(len(z))[:, :2])) * max(1.0, left)
-    return prior_sd[:2] * z[:2], prior_sd[:2] ** 2 * variances, left
+    squares = np.square(values - scaled @ z)
+    left = float(squares.mean())
+    variances = np.diag(cho_solve(factor, np.eye(len(z))[:, :n])) * max(1.0, left)
+    cost = float(counts * squares.sum() + np.square(z[n:]).sum())
+    return _Step(prior_sd[:n] * z[:n], prior_sd[:n] ** 2 * variances, left, cost)
 
 
 def _through(at: npt.NDArray[np.intp], values: Array, wanted: npt.NDArray[np.intp]) -> Array:

@@ -40,10 +40,11 @@ LEAST_S = 0.016
 """A lesser delay is left to `plate_clock`: skin and the model do as much to the centre of mass' acceleration.
 Recordings in step have their minimum at 0 to 6 ms (real, but for one at 15), walks of `truth3d` with joints found from
 markers 5 to 10 ms later than their plates are."""
-LONGEST_LEGS_S, LEAST_LEGS_S, COARSE_LEGS_S = 0.15, 0.025, 0.01
+LONGEST_LEGS_S, LEAST_LEGS_S, COARSE_LEGS_S = 0.15, 0.025, 0.015
 """The same of a body whose trunk no marker shows, by the vertical force alone: it needs no lean, and the trunk goes up
 and down with the pelvis. In step the minimum lies at 0 to 10 ms in 8 simulated walks and squats and 4 real recordings
-without their trunks' markers, at -10 in one whose whole body says 9, at 10 to 20 in 3 that have no others."""
+without their trunks' markers, at -10 in one whose whole body says 9, at 10 to 20 in 3 that have no others, at -31 to 5
+in `truth3d`'s. What is less, and what is then left, `plate_clock` finds."""
 WIDE_S, EVIDENT, APART, WIDE_JUDGED_S = 0.5, 0.4, 1.5, 1.0
 """Where the force fits best at the end of that range, or nowhere in it, longer delays are looked for. One is believed
 where its misfit is so much less than in step (0.09 to 0.12 of walks that were moved by 0.1 to 0.3 s), no delay more
@@ -165,19 +166,6 @@ def _fitting(needed: Needed, found: _Misfits, less: float) -> Delay | None:
     return Delay(delay, sd_s) if found.judged_s[k] > KEPT * found.judged_s[len(found.delay) // 2] else None
 
 
-def hides_clock(needed: Needed, force: Array) -> bool:
-    """Whether a body without its trunk's markers moves, and yet no delay of its plates would be found."""
-    known = needed.judged(force)
-    if needed.whole or not needed.judged_s(force) >= _SHORTEST_S:
-        return False
-    if force[known, 1].std() < VIGOROUS * needed.weight:
-        return False
-    misfits = _misfits(needed, force, LONGEST_LEGS_S).misfit
-    middle, by = len(misfits) // 2, round(2.0 * LEAST_LEGS_S / STEP_S)
-    least, aside = misfits.min(), min(misfits[middle - by], misfits[middle + by])
-    return bool(least > LESS * aside or least > NEAR * needed.weight)
-
-
 class _Misfits(NamedTuple):
     """Delays, s, the misfit of forces that are taken so much later, N, and how long it was judged, s."""
 
@@ -213,12 +201,22 @@ def drift_in_words(delay: Delay, time: Array) -> str:
     )
 
 
+def apart_in_words(delay: Delay, plates: Sequence[str]) -> str:
+    """Which plates (P,) have a clock of their own, and how far the others lag."""
+    ms = [1000.0 * more for more in delay.apart]
+    own = [f"{name} is {abs(by):.0f} ms {_where(by)} the others" for name, by in zip(plates, ms, strict=True) if by]
+    others = clock_in_words(delay.delay_s, delay.sd_s).replace("the plates are", "those are", 1)
+    return f"By the motion the plates have not one clock: {listed(own)}; {others}"
+
+
 def clock_in_words(delay_s: float, sd_s: float) -> str:
     """How far the plates lag behind the markers, or run ahead of them."""
-    where = "behind" if delay_s >= 0.0 else "ahead of"
-    return (
-        f"the plates are {1000.0 * abs(delay_s):.1f} ms {where} the markers (standard deviation {1000.0 * sd_s:.1f} ms)"
-    )
+    how_well = f"(standard deviation {1000.0 * sd_s:.1f} ms)"
+    return f"the plates are {1000.0 * abs(delay_s):.1f} ms {_where(delay_s)} the markers {how_well}"
+
+
+def _where(delay: float) -> str:
+    return "behind" if delay >= 0.0 else "ahead of"
 
 
 def fitting_rate(needed: Needed, force: Array) -> tuple[float, float] | None:
@@ -255,16 +253,16 @@ def wrong_rate_in_words(rate: float, fitting: float, slope: float) -> str:
     )
 
 
-def brought_into_step(recording: Recording, delay_s: float | Array) -> Recording:
-    """The recording with what its plates say so much later, one or (T,), at each time; not known (NaN) where they end
-    before."""
+def brought_into_step(recording: Recording, delay_s: float | Array, apart: Sequence[float] = ()) -> Recording:
+    """The recording with what its plates say so much later, one or (T,), at each time, each (P,) so much more that is
+    ``apart``; not known (NaN) where they end before."""
 
-    def of(plate: Plate) -> Plate:
+    def of(plate: Plate, more: float) -> Plate:
         values = (plate.force, plate.moment, plate.cop, plate.free_moment)
-        force, moment, cop, free = (_later(recording.time, each, delay_s) for each in values)
+        force, moment, cop, free = (_later(recording.time, each, delay_s + more) for each in values)
         return replace(plate, force=force, moment=moment, cop=cop, free_moment=free)
 
-    return recording.with_plates(tuple(of(plate) for plate in recording.plates))
+    return recording.with_plates(tuple(map(of, recording.plates, apart or [0.0] * len(recording.plates))))
 
 
 def _later(time: Array, values: Array, delay_s: float | Array) -> Array:

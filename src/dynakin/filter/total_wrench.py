@@ -12,14 +12,14 @@ from dynakin.errors import RecordingError
 from dynakin.filter.carried import carried_in_hands, carried_in_words
 from dynakin.filter.declared import may_bear, plate_of_its_own
 from dynakin.filter.expected import ContactPaths
-from dynakin.filter.plate_clock import Delay, clock_delay
+from dynakin.filter.plate_clock import UNKNOWN_S, Delay, clock_delay
 from dynakin.filter.plate_gain import NO_GAINS, found_gains
 from dynakin.filter.plate_motion import (
     Needed,
+    apart_in_words,
     brought_into_step,
     drift_in_words,
     fitting_rate,
-    hides_clock,
     out_of_step_in_words,
     plates_delay,
     turned_axes,
@@ -43,11 +43,15 @@ from dynakin.recordings.recording import Recording
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-CLOCK_HIDDEN = "Not all of the body is marked: this movement does not show whether plates and markers are in step."
 CLOCK_UNKNOWN = (
     "Whether plates and markers are in step within some milliseconds is not known here: it takes half a second of a "
-    "movement in which the plates carry all of the person, never more than twice the weight, and no declared contact."
+    "movement in which the plates carry all of the person, never more than twice the weight, and no declared contact. "
+    "Deviations of moments hold a few."
 )
+ROUNDS = 3
+"""Once single plates are in step, more frames may be known, and others are found not to be; what a body that is not
+marked whole shows is drawn towards none, and farther off than the fine search reaches."""
+CLOCK_OF_LEGS = ", which may be none: not all of the body is marked. Deviations of moments hold it."
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +68,8 @@ class Ground:
         shear: by how much the plates' horizontal forces are off.
         off_gain: (T, F) part of its load by which the plate under each foot may be off; None: nothing contradicts it.
         notes: what there is to say. reasons: those of them that say why something is not measured.
-        behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how well that
-            is known, where they were.
+        behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how far they
+            may be out of it still; 0: no farther than usual.
     """
 
     loads: FootLoads | None
@@ -103,17 +107,7 @@ def known_ground(
     zeroed, said = _zeroed(recording, initial, assigned)
     if zeroed is not recording:
         recording, wrench = zeroed, initial.ground.wrench_to_ground(zeroed.total_wrench())
-    ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance)
-    ground = replace(ground, notes=(*said, *ground.notes))
-    left = None
-    if ground.loads is not None:
-        left = clock_delay(initial, recording.time, markers, known, drifts=not about(ground.notes, "carried"))
-    if left is None and ground.loads is not None and ground.usable and not ground.behind_s and not initial.unseen_kg:
-        ground = replace(ground, notes=(*ground.notes, note("sum of the plates", CLOCK_UNKNOWN)))
-    if left is None or not left.worth_it:  # the coarse search's deviation gives way to the finer one's
-        return (replace(ground, clock_sd_s=left.sd_s) if left is not None and ground.behind_s else ground), known
-    delay = left._replace(delay_s=ground.behind_s + left.delay_s)
-    ground, known = _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
+    ground, known = _in_step(recording, initial, markers, wrench, assigned, tolerance)
     return replace(ground, notes=(*said, *ground.notes)), known
 
 
@@ -125,6 +119,44 @@ def _zeroed(
         return recording, []
     others = {plate for plate, bearer in (assigned or {}).items() if bearer in initial.contacts}
     return without_offsets(recording, initial.ground, initial.markers_on_feet, others, only_said=bool(initial.contacts))
+
+
+def _in_step(
+    recording: Recording,
+    initial: CalibratedModel,
+    markers: Array,
+    wrench: Array,
+    assigned: Mapping[str, str] | None,
+    tolerance: float | None,
+) -> tuple[Ground, Array]:
+    """`known_ground` of plates that are at zero while nobody is on them."""
+    ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance)
+    if ground.loads is None or not ground.loads.on.any():
+        return ground, known
+    whole, moved = not initial.unseen_kg, Delay(ground.behind_s, 0.0)
+    for _ in range(ROUNDS):
+        plates = _moved(recording, moved).plates
+        each = np.stack([initial.ground.wrench_to_ground(plate.wrench) for plate in plates])
+        left = clock_delay(initial, recording.time, markers, known, not about(ground.notes, "carried"), each)
+        if left is None or not left.worth_it(whole or bool(moved.delay_s)):  # what was found coarsely is known worse
+            break
+        moved = left.after(moved)
+        ground, known = _brought_into_step(recording, initial, markers, moved, assigned, tolerance)
+        if whole and not left.apart:
+            return ground, known
+    if moved.sd_s and moved.worth_it(whole):
+        return ground, known
+    if moved.sd_s:  # the coarse search had it out of step
+        left = moved
+        ground, known = _known_ground(recording, initial, markers, wrench, assigned, tolerance, in_step=True)
+    if left is None:
+        said = () if ground.behind_s else (note("sum of the plates", CLOCK_UNKNOWN),)
+        return replace(ground, notes=(*ground.notes, *said), clock_sd_s=ground.clock_sd_s or UNKNOWN_S), known
+    if whole:  # the coarse search's deviation gives way to the finer one's
+        return (replace(ground, clock_sd_s=left.sd_s) if ground.behind_s else ground), known
+    said = () if ground.behind_s else (note("sum of the plates", f"{out_of_step_in_words(left)}{CLOCK_OF_LEGS}"),)
+    may_be = float(np.hypot(left.delay_s, left.sd_s))
+    return replace(ground, notes=(*ground.notes, *said), clock_sd_s=may_be), known
 
 
 def _known_ground(
@@ -185,8 +217,6 @@ def _known_ground(
         delay = None if in_step else plates_delay(needed.vertically() if shear.unmeasured else needed, total)
         if delay is not None:
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
-        if not in_step and hides_clock(needed, total):
-            by_motion.append(note("sum of the plates", CLOCK_HIDDEN))
         found = None if initial.contacts else fitting_rate(needed, total)
         if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
             by_motion.append(warning("rate", wrong_rate_in_words(needed.rate, *found)))
@@ -280,6 +310,11 @@ def _light_feet(before: FootLoads, loads: FootLoads, beyond: Flags) -> list[Mess
     return found
 
 
+def _moved(recording: Recording, delay: Delay) -> Recording:
+    lags = delay.lags(recording.time) if delay.drift else delay.delay_s
+    return brought_into_step(recording, lags, delay.apart) if delay.worth_it(True) else recording
+
+
 def _brought_into_step(
     recording: Recording,
     initial: CalibratedModel,
@@ -289,14 +324,18 @@ def _brought_into_step(
     tolerance: float | None,
 ) -> tuple[Ground, Array]:
     """`known_ground` of what the plates say so much later, with a sentence on it."""
-    there = brought_into_step(recording, delay.lags(recording.time) if delay.drift else delay.delay_s)
+    there = _moved(recording, delay)
     wrench = initial.ground.wrench_to_ground(there.total_wrench())
     ground, known = _known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
     found = drift_in_words(delay, recording.time) if delay.drift else out_of_step_in_words(delay)
+    if delay.apart:
+        found = apart_in_words(delay, [plate.name for plate in recording.plates])
     words = f"{found}; they were brought into step."
     said = note("in step", words)
     if delay.drift:
         said = warning("rate", f"{words} Correct the rate, or the times, in the file that is wrong.")
+    elif delay.apart:
+        said = warning("in step", f"{words} Synchronise the plates with each other.")
     elif initial.unseen_kg:
         said = warning(
             "in step", f"{words} Not all of the body is marked, so that no better is known: synchronise both."
