@@ -207,15 +207,19 @@ def _apart(
     """The delay of most plates (T, 6), and how much more others lag; None where one clock, or one that drifts (which
     costs so much), explains them."""
 
-    def found(groups: list[Array]) -> tuple[Array, _Step]:
+    def found(groups: list[Array], passes: int) -> tuple[Array, _Step]:
         lag = np.zeros(len(groups))
-        for _ in range(DRIFT_PASSES):
+        for _ in range(passes):
             there = [in_step(time, group, by) for group, by in zip(groups, lag, strict=True)]
             step = _step(judged, np.sum(there, axis=0), noise, prior_sd, [_Lag(group, WIDE_S) for group in there])
             lag = lag + step.step
         return lag, step
 
-    (_, together), (lag, each) = found([np.sum(plates, axis=0)]), found(plates)
+    ways = [np.sum(plates, axis=0)], plates
+    (_, together), (_, each) = (found(way, 1) for way in ways)
+    if each.cost > together.cost - 0.5 * APART_COST:  # a first pass takes most of it: no need to look closer
+        return None
+    (_, together), (lag, each) = (found(way, DRIFT_PASSES) for way in ways)
     spread = max(1.0, each.left)
     if each.cost > min(together.cost - APART_COST * spread, drifting - BETTER_COST * spread):
         return None
