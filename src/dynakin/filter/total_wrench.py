@@ -335,9 +335,7 @@ def _brought_into_step(
     if delay.drift:
         said = warning("rate", f"{words} Correct the rate, or the times, in the file that is wrong.")
     elif delay.apart:
-        said = warning("in step", f"{words} Synchronise the plates with each other.")
+        said = warning("in step", words)
     elif initial.unseen_kg:
-        said = warning(
-            "in step", f"{words} Not all of the body is marked, so that no better is known: synchronise both."
-        )
+        said = warning("in step", f"{words} Not all of the body is marked, so that no better is known.")
     return replace(ground, notes=(said, *ground.notes), behind_s=delay.delay_s, clock_sd_s=delay.sd_s), known

@@ -79,6 +79,11 @@ _KINDS = (
         "without it (--mass); or use moments of knees and ankles alone.",
     ),
     _Kind(
+        "Plates' clock",
+        ("in step",),
+        "Record plates and markers with one clock (a common trigger); moments of this trial hold what is left of it.",
+    ),
+    _Kind(
         "Plates' zero",
         ("zero",),
         "Zero the plates with nobody on them before each trial; of this one take off what they read then, where it is "
@@ -103,7 +108,7 @@ _KINDS = (
     ),
     _Kind(
         "Force plates",
-        ("plates", "sum of the plates", "in step"),
+        ("plates", "sum of the plates"),
         "Look with dynakin check which plates are read, where they lie, and what bears on them; declare what else does "
         "(--contact).",
     ),
