@@ -103,7 +103,7 @@ class LandmarkFinder:
         lacking: dict[str, list[str]] = {}
         for name, why in wanted.items():
             if not self.known(name):
-                how = self._first_absent(name, side)
+                how = self._first_absent(name, side) if name in self._recipes else "no recipe for it"
                 lacking.setdefault(how, []).append(f"landmark {name!r} ({why})")
         if lacking:
             raise ModelError(

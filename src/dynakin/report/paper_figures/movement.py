@@ -113,7 +113,8 @@ def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
             wide = band_is_too_wide(own, 0.5 * half)  # it would press the line flat
             if not wide:
                 axes.fill_between(estimate.time, own - half, own + half, color=colour, alpha=0.18, linewidth=0)
-            notes.append(f"2 sd: {number(float(np.nanmedian(half)), unit, digits=2)}{' (too wide)' if wide else ''}")
+            usual = float(np.nanmedian(half)) if np.isfinite(half).any() else np.nan
+            notes.append(f"2 sd: {number(usual, unit, digits=2)}{' (too wide)' if wide else ''}")
         if alone:
             axes.margins(y=0.12)
             axes.set_xlabel("\n".join(notes))
