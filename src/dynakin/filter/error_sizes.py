@@ -39,7 +39,7 @@ class Sizes:
         own_speeds, own_moments: what the factor on the filter's own variance of smoothed speeds and moments grows by
             with the movement's intensity (`reported_sd.OWN_LATE`).
         vigorous: intensity beyond which what is unseen of smoothed moments grows faster (`reported_sd.VIGOROUS_GROWS`):
-            walks stay below it.
+            calm walks stay below it.
         own_off_plates: part of the variance by the declared noise that counts at least, of late moments that are
             measured in a recording in which some foot stands off the plates, or in a session in which one has: what
             plates do not see they do not correct, and small innovations do not show it.

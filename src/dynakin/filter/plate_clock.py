@@ -44,9 +44,12 @@ goes up and down with the pelvis); and a delay of fewer of its deviations is non
 without their upper bodies' markers, whose plates are 2 ms late: 5.2 to 7.9 found in walks, -0.9 to 8.5 in squats, 1.6
 deviations at most. 3.7 to 9.8 and -2.2 to 7.3 in seeds 61 to 64, real ones within 1.6 deviations (`walking1` 12.6 and
 of the whole body 5)."""
-UNKNOWN_S = 0.007
-"""How far out of step plates may be where nothing judges it: most are 2 ms, some 20. So late, `truth3d`'s walk over one
-plate (seed 1) has an ankle 2.4 to 2.7 of its deviations off; as it is, deviations are 1.1 to 1.7 times the errors."""
+UNKNOWN_S = 0.005
+"""How far out of step plates may be where nothing judges it: most are 2 ms, some 20. `truth3d`'s walks over one plate
+(seeds 1, 2), 2 ms late, have deviations 1.1 to 1.8 times their errors with 5 and with 8 ms, and an .osim's ankle 3.1
+times with 7."""
+KNOWN_S = 0.004
+"""Where plates have not one clock, one whose delay is known worse keeps the others': it is loaded too shortly."""
 FORCE, MOMENT_M = 0.033, 0.017
 """What motion and plates disagree on, parts of the weight (m for moments), at least: 20 N and 10 N m."""
 MASS, CENTRE_M, INERTIA, LEAST_INERTIA = 0.1, 0.02, 0.2, 1e-3
@@ -225,12 +228,14 @@ def _apart(
         return None
     order, known = np.argsort(lag), 1.0 / each.variance
     usual = lag[order[np.searchsorted(np.cumsum(known[order]), 0.5 * known.sum())]]
-    own = np.abs(lag - usual) > np.maximum(APART_S, APART_SD * np.sqrt(each.variance))
+    sd = np.sqrt(each.variance)
+    own = (np.abs(lag - usual) > np.maximum(APART_S, APART_SD * sd)) & (sd < KNOWN_S)
     if not own.any():
         return None
     known[own] = 0.0
     delay = float(known @ lag / known.sum())
-    return Delay(delay, float(known.sum() ** -0.5), apart=tuple(np.where(own, lag - delay, 0.0).tolist()))
+    unsure = UNKNOWN_S if (sd >= KNOWN_S).any() else 0.0
+    return Delay(delay, max(float(known.sum() ** -0.5), unsure), apart=tuple(np.where(own, lag - delay, 0.0).tolist()))
 
 
 class _Lag(NamedTuple):

@@ -25,7 +25,7 @@ from dynakin.filter.plate_motion import (
     turned_axes,
     wrong_rate_in_words,
 )
-from dynakin.filter.plate_sum import judged_by_motion
+from dynakin.filter.plate_sum import MASS_APART, judged_by_motion
 from dynakin.filter.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear
 from dynakin.messages import Message, about, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -39,6 +39,7 @@ from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.plates.stuck import vertical_only
 from dynakin.recordings.recording import Recording
+from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -48,6 +49,9 @@ CLOCK_UNKNOWN = (
     "movement in which the plates carry all of the person, never more than twice the weight, and no declared contact. "
     "Deviations of moments hold a few."
 )
+SUPPORT = 0.03
+"""Part of the weight by which the plates' load would be farther from it without what is read beside the feet: then
+that is no zero but a rail or a hand's plate, which bears so much."""
 ROUNDS = 3
 """Once single plates are in step, more frames may be known, and others are found not to be; what a body that is not
 marked whole shows is drawn towards none, and farther off than the fine search reaches."""
@@ -104,21 +108,27 @@ def known_ground(
     Raises:
         RecordingError: the plates are refused.
     """
-    zeroed, said = _zeroed(recording, initial, assigned)
+    zeroed, said = _zeroed(recording, initial)
     if zeroed is not recording:
         recording, wrench = zeroed, initial.ground.wrench_to_ground(zeroed.total_wrench())
     ground, known = _in_step(recording, initial, markers, wrench, assigned, tolerance)
     return replace(ground, notes=(*said, *ground.notes)), known
 
 
-def _zeroed(
-    recording: Recording, initial: CalibratedModel, assigned: Mapping[str, str] | None
-) -> tuple[Recording, list[Message]]:
-    """The recording without what its plates read while nobody is on them, with sentences on it."""
-    if not initial.feet:
+def _zeroed(recording: Recording, initial: CalibratedModel) -> tuple[Recording, list[Message]]:
+    """The recording without what its plates read while nobody is on them, with sentences on it; as it is where a
+    contact is declared, which may bear on any plate, or where the person weighs no less than all of it."""
+    if not initial.feet or initial.contacts:
         return recording, []
-    others = {plate for plate, bearer in (assigned or {}).items() if bearer in initial.contacts}
-    return without_offsets(recording, initial.ground, initial.markers_on_feet, others, only_said=bool(initial.contacts))
+    zeroed, said = without_offsets(recording, initial.ground, initial.markers_on_feet)
+    loads = [initial.ground.wrench_to_ground(each.total_wrench())[:, 1] for each in (recording, zeroed)]
+    before, after = (abs(_median(load) / (initial.weighed_kg * GRAVITY_M_S2) - 1.0) for load in loads)
+    bears = before < MASS_APART and after - before > SUPPORT
+    return (recording, []) if bears else (zeroed, said)
+
+
+def _median(load: Array) -> float:
+    return float(np.median(load[np.isfinite(load)])) if np.isfinite(load).any() else 0.0
 
 
 def _in_step(

@@ -7,7 +7,7 @@ it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -64,16 +64,8 @@ def without_offsets(
     recording: Recording,
     ground: GroundFrame,
     foot_markers: Mapping[str, Sequence[str]],
-    bearing_others: Collection[str] = (),
-    *,
-    only_said: bool = False,
 ) -> tuple[Recording, list[Message]]:
-    """The recording, itself where there is nothing to take off, with its plates at zero while nobody is on them.
-
-    Args:
-        bearing_others: plates that something else than feet bears on.
-        only_said: nothing is taken off: something else bears the person, and may do so on any plate.
-    """
+    """The recording, itself where there is nothing to take off, with its plates at zero while nobody is on them."""
     places = foot_places(recording, ground, foot_markers)
     if len(places) < len(foot_markers) or recording.n_frames < 2:
         return recording, []
@@ -82,16 +74,14 @@ def without_offsets(
     on_ground = [GroundPlate.of(plate, ground) for plate in plates]
     most = np.max(np.sum([plate.push for plate in on_ground], axis=0), initial=0.0)
     for p, plate in enumerate(plates):
-        if plate.name in bearing_others:
-            continue
         clear = _clear(on_ground[p], feet, NOBODYS * float(most))
         offset = _offset_of(on_ground[p], plate.wrench, clear, recording)
         if offset is None:
             continue
         found.append(offset)
-        if offset.wrench is not None and not only_said:
+        if offset.wrench is not None:
             plates[p] = without_wrench(plate, offset.wrench, axis_vector(ground.vertical))
-    taken = [offset for offset in found if offset.wrench is not None and not only_said]
+    taken = [offset for offset in found if offset.wrench is not None]
     said = _left_in_words([offset for offset in found if offset not in taken], recording.time)
     if not taken:
         return recording, said

@@ -86,8 +86,8 @@ _KINDS = (
     _Kind(
         "Plates' zero",
         ("zero",),
-        "Zero the plates with nobody on them before each trial; of this one take off what they read then, where it is "
-        "not said to be taken off ([[plate_loads]] in a configuration, docs/models.md).",
+        "Zero the plates with nobody on them before each trial; what is not said to be taken off, take off by "
+        "[[plate_loads]] in a configuration (docs/models.md).",
     ),
     _Kind(
         "Plates' gain",

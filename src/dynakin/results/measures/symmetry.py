@@ -155,7 +155,7 @@ def _mean(of: Callable[..., float], values: Array, parts: Sequence[slice], *alon
 
 def _range(values: Array) -> float:
     """NaN where not all is known: what is missing may hold the largest or the smallest."""
-    return float(np.ptp(values))
+    return float(np.ptp(values)) if len(values) else float("nan")
 
 
 def _largest(values: Array) -> float:
