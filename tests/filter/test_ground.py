@@ -28,6 +28,7 @@ from dynakin.recordings.feet.loads import SWING
 from dynakin.recordings.feet.loads import UNKNOWN as FOOT_UNKNOWN
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.report.insights import insights
 from dynakin.results.measures.feet import foot_sources
@@ -93,6 +94,20 @@ def test_a_seat_that_nothing_measures_is_noticed_and_leaves_no_moments(seed: int
     assert np.isnan(found.data["wrench_measured"].values[absent]).all()
     said = [text for text in map(str, found.messages) if "no plate measures" in text]
     assert len(said) == 1 and "less upwards" in said[0]
+
+
+@pytest.mark.parametrize("bears", [False, True])
+def test_what_a_plate_reads_beside_the_feet_is_its_zero_unless_the_weight_asks_for_it(bears: bool) -> None:
+    """A hand's plate that bears 6.5 % of the weight, and a plate of which nobody knew that it reads so much."""
+    recording = simulate("fullbody", "squat", 11, 12.0).recording
+    beside, n = 0.065 * WEIGHT, recording.n_frames
+    force = np.tile([0.0, beside, 0.0], (n, 1))
+    floor = Surface(np.zeros(3), np.array([0.0, 1.0, 0.0]))
+    moment = np.cross([3.0, 0.0, 3.0], force)
+    rail = plate_from_wrench("rail", force, moment, floor, corners=None, threshold_n=10.0, zero_unloaded=False)
+    others = with_loads(recording, np.full(n, 1.0 - beside / WEIGHT if bears else 1.0)).plates
+    said = [str(text) for text in ground_of(recording.with_plates((*others, rail)), person("fullbody")).notes]
+    assert any("rail reads" in text and "taken off" in text for text in said) != bears
 
 
 @pytest.fixture(scope="module")

@@ -87,7 +87,7 @@ def test_warnings_of_one_kind_are_one_finding(estimate: Estimate) -> None:
     said = [
         warning("plates", "one."),
         warning("mass", "two."),
-        warning("in step", "three."),
+        warning("sum of the plates", "three."),
         warning("labels", "four."),
     ]
     made = {insight.title: insight.text for insight in warned(replace(estimate, messages=said), {})}

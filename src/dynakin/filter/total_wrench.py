@@ -121,6 +121,8 @@ def _zeroed(recording: Recording, initial: CalibratedModel) -> tuple[Recording, 
     if not initial.feet or initial.contacts:
         return recording, []
     zeroed, said = without_offsets(recording, initial.ground, initial.markers_on_feet)
+    if zeroed is recording:
+        return recording, said
     loads = [initial.ground.wrench_to_ground(each.total_wrench())[:, 1] for each in (recording, zeroed)]
     before, after = (abs(_median(load) / (initial.weighed_kg * GRAVITY_M_S2) - 1.0) for load in loads)
     bears = before < MASS_APART and after - before > SUPPORT
