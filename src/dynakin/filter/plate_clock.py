@@ -111,7 +111,8 @@ class Delay(NamedTuple):
     def after(self, other: Delay) -> Delay:
         """Of plates that were brought into step by another."""
         apart = np.add(self.apart or 0.0, other.apart or 0.0) if self.apart or other.apart else np.zeros(0)
-        return self._replace(delay_s=self.delay_s + other.delay_s, apart=tuple(apart.tolist()))
+        sd = max(self.sd_s, other.sd_s) if other.apart else self.sd_s  # some plates' own delays may not be known
+        return self._replace(delay_s=self.delay_s + other.delay_s, sd_s=sd, apart=tuple(apart.tolist()))
 
     def worth_it(self, whole: bool) -> bool:
         """Whether it is worth bringing the plates into step, of a body that is marked whole or not."""
