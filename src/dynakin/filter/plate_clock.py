@@ -391,11 +391,8 @@ def _step(judged: list[tuple[slice, _Needed]], plates: Array, noise: Array, prio
     which counts as so much of one as its low-pass leaves; what is left that is more than the noise counts as noise."""
     equations = [need.equations(part, plates, noise, lags) for part, need in judged]
     H, values = (np.concatenate(each) for each in zip(*equations, strict=True))
-    counts, n, prior_sd = (
-        min(2.0 * CUTOFF_HZ / judged[0][1].rate, 1.0),
-        len(lags),
-        np.r_[[lag.wide for lag in lags], prior_sd],
-    )
+    counts, n = min(2.0 * CUTOFF_HZ / judged[0][1].rate, 1.0), len(lags)
+    prior_sd = np.r_[[lag.wide for lag in lags], prior_sd]
     scaled = H * prior_sd
     factor = cho_factor(counts * scaled.T @ scaled + np.eye(len(prior_sd)))
     z = cho_solve(factor, counts * scaled.T @ values)
