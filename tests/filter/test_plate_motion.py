@@ -453,3 +453,16 @@ def test_plates_that_nothing_judges_may_be_some_milliseconds_out_of_step() -> No
     one, whole = (person().prepare(walk.with_plates(walk.plates[k:2])).ground for k in (1, 0))
     assert one.clock_sd_s == UNKNOWN_S and any("is not known here" in message.text for message in one.notes)
     assert whole.clock_sd_s == 0.0 or whole.behind_s
+
+
+def test_a_pelvis_that_nobody_sees_says_nothing_of_the_plates() -> None:
+    """A hidden pelvis made plates of a squat contradict each other: what hangs on it is not where the others show."""
+    recording = simulate("fullbody", "squat", 3, 6.0).recording
+    ready = person().prepare(recording)
+    root = [k for k, marker in enumerate(ready.calibrated.spec.markers) if marker.segment == "pelvis"]
+    whole = Needed(ready.calibrated, recording.time, ready.markers).known
+    for frames, said in ((slice(200, 210), True), (slice(200, 260), False)):
+        markers = ready.markers.copy()
+        markers[frames, root] = np.nan
+        known = Needed(ready.calibrated, recording.time, markers).known
+        assert whole[frames].all() and known[frames].all() == said and known[frames].any() == said

@@ -20,6 +20,7 @@ from dynakin.filter.mass_centre import mass_centre
 from dynakin.filter.plate_clock import Delay
 from dynakin.filter.plate_lean import root_path, turned_by_lean
 from dynakin.filter.samples import in_step
+from dynakin.filter.sources import hidden_segments, root_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.plates.axes import TURNS, PlateAxes, turned_feet
 from dynakin.recordings.recording import Plate, Recording
@@ -85,7 +86,8 @@ class Needed:
 
     Attributes:
         time: (T,) s. rate: Hz. weight: N, with what is carried.
-        force: (T, 3) N, ground axes. known: (T,) frames in which it is. whole: all of the body is marked.
+        force: (T, 3) N, ground axes. known: (T,) frames in which it is, and the pelvis is seen, which carries the rest.
+            whole: all of the body is marked.
         root: (T, 3) m, `root_path`.
     """
 
@@ -93,7 +95,8 @@ class Needed:
         found = mass_centre(initial, time, markers)
         self.time, self.rate, self.weight = time, rate_of(time), initial.weighed_kg * GRAVITY_M_S2
         self.whole, self.root = not initial.unseen_kg, root_path(initial, markers)
-        self.known: Flags = np.zeros(len(time), dtype=bool) if found is None else found.known
+        unseen = hidden_segments(initial.spec, markers, time).get(root_of(initial.spec), np.False_)
+        self.known: Flags = np.zeros(len(time), dtype=bool) if found is None else found.known & ~unseen
         self.force = np.zeros((len(time), 3)) if found is None else found.needed_force(initial.weighed_kg)
 
     def vertically(self) -> Needed:
