@@ -27,6 +27,7 @@ from dynakin.recordings.recording import Plate, Recording
 from dynakin.report.insights import insights
 from dynakin.results.files.netcdf import full_dataset
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.settings.effect import without_effect
 from dynakin.settings.noise import Noise
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
@@ -148,7 +149,7 @@ def _made(spec: Spec) -> Run:
     told = {"mass_kg": MASS_KG, "height_m": HEIGHT_M, "sex": SEX, "markers": spec.markers} | dict(spec.told)
     told |= {"model": "sagittal7" if spec.motion == "sagittal" else "fullbody", "lag_s": np.inf if spec.smooth else 0.0}
     if spec.noise != 1.0:
-        told["noise"] = scaled_noise(spec.noise)
+        told["noise"] = scaled_noise(spec.noise, floating=spec.motion != "sagittal")
     truth = trial.truth.data[["coordinates", "speeds", "moments"]]
     truth = truth.isel(time=np.searchsorted(truth["time"].values, recording.time - 1e-9))
     if static is not None:
@@ -169,11 +170,13 @@ def _made(spec: Spec) -> Run:
 LARGE = ("joint_orientations", "joint_loads", "initial_covariance", "final_covariance", "joint_centres")
 
 
-def scaled_noise(factor: float) -> dict[str, float | bool]:
-    """The default noise settings with their standard deviations times ``factor``, as a preset fixes them."""
+def scaled_noise(factor: float, *, floating: bool) -> dict[str, float | bool]:
+    """The default noise settings with their standard deviations times ``factor``, as a preset fixes them, of those that
+    such a model has."""
     default = Noise().model_dump()
     scaled = {key: factor * default[key] for key in NOISE} | {key: factor**2 * default[key] for key in VARIANCES}
-    return {"adapt": False} | scaled
+    idle = without_effect(list(scaled), Noise(), [floating])
+    return {"adapt": False} | {key: value for key, value in scaled.items() if key not in idle}
 
 
 def _half(recording: Recording, _: float) -> Recording:
