@@ -208,14 +208,14 @@ def apart_in_words(delay: Delay, plates: Sequence[str]) -> str:
     """Which plates (P,) have a clock of their own, and how far the others lag."""
     ms = [1000.0 * more for more in delay.apart]
     own = [f"{name} is {abs(by):.0f} ms {_where(by)} the others" for name, by in zip(plates, ms, strict=True) if by]
-    others = clock_in_words(delay.delay_s, delay.sd_s).replace("the plates are", "those are", 1)
+    others = clock_in_words(delay.delay_s, delay.sd_s, "those")
     return f"By the motion the plates have not one clock: {listed(own)}; {others}"
 
 
-def clock_in_words(delay_s: float, sd_s: float) -> str:
-    """How far the plates lag behind the markers, or run ahead of them."""
+def clock_in_words(delay_s: float, sd_s: float, which: str = "the plates") -> str:
+    """How far these plates lag behind the markers, or run ahead of them."""
     how_well = f"(standard deviation {1000.0 * sd_s:.1f} ms)"
-    return f"the plates are {1000.0 * abs(delay_s):.1f} ms {_where(delay_s)} the markers {how_well}"
+    return f"{which} are {1000.0 * abs(delay_s):.1f} ms {_where(delay_s)} the markers {how_well}"
 
 
 def _where(delay: float) -> str:

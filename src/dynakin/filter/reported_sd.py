@@ -51,7 +51,7 @@ def beyond_vigorous(intensity: Array, vigorous: float, step_s: float) -> Array:
     """(...,) how many times ``vigorous`` the largest intensity (...,) of these moments lies beyond it, 0 below."""
     most = np.array(intensity, dtype=float)
     reach = int(VIGOROUS_S / step_s + 1e-6) if most.ndim and step_s > 0.0 else 0
-    for k in range(1, min(reach, len(most) - 1) + 1 if most.ndim else 1):
+    for k in range(1, reach + 1):
         most[k:] = np.fmax(most[k:], intensity[:-k])
         most[:-k] = np.fmax(most[:-k], intensity[k:])
     return np.maximum(most / vigorous - 1.0, 0.0)

@@ -131,8 +131,11 @@ class LiveSight:
         owners = [marker.segment for marker in spec.markers]
         self._segments = list(dict.fromkeys(owners))
         self._own = [[k for k, owner in enumerate(owners) if owner == segment] for segment in self._segments]
-        self._least = [min(LEAST_OF_ROOT, len(own)) if s == root_of(spec) else 1
-                       for s, own in zip(self._segments, self._own, strict=True)]  # fmt: skip
+        root = root_of(spec)
+        self._least = [
+            min(LEAST_OF_ROOT, len(own)) if segment == root else 1
+            for segment, own in zip(self._segments, self._own, strict=True)
+        ]
         self._lost_s = np.full(len(owners), -np.inf)  # when each was lost; inf: it is seen, -inf: it never was
         self.used = np.zeros(len(owners), dtype=bool)  # `in_use`
 

@@ -283,13 +283,14 @@ class _Assignment:
         """Frames [first, end) of each foot's stances with its setting down and leaving; all of them where nobody sees
         it, or where it never stands."""
         n, found = len(self.off), []
-        half = self.step
         for name in self.feet:
             foot = self.contacts.get(name)
             stances = () if foot is None else foot.stances
             unseen = [] if foot is None else runs(~foot.seen)
             found.append(
-                [(max(0, a - half), min(n, b + half)) for a, b in (*stances, *unseen)] if stances else [(0, n)]
+                [(max(0, a - self.step), min(n, b + self.step)) for a, b in (*stances, *unseen)]
+                if stances
+                else [(0, n)]
             )
         return found
 

@@ -82,7 +82,7 @@ def without_offsets(
         if offset.wrench is not None:
             plates[p] = without_wrench(plate, offset.wrench, axis_vector(ground.vertical))
     taken = [offset for offset in found if offset.wrench is not None]
-    said = _left_in_words([offset for offset in found if offset not in taken], recording.time)
+    said = _left_in_words([offset for offset in found if offset.wrench is None], recording.time)
     if not taken:
         return recording, said
     return recording.with_plates(tuple(plates)), [_taken_in_words(taken), *said]
@@ -161,5 +161,4 @@ def _left_in_words(left: Sequence[_Offset], time: Array) -> list[Message]:
             "with plate_loads.",
         )
         for offset in left
-        if abs(offset.middle_n) > UNLOADED_N
     ]

@@ -25,15 +25,12 @@ def without_doubles(recording: Recording) -> Recording:
     for first, second in combinations(recording.plates, 2):
         if first.name not in plates or second.name not in plates or not _same_load(first, second):
             continue
-        both, one_place = (
-            f"{first.name} and {second.name} hold the same forces in every row",
-            _same_place(first, second),
-        )
-        if not one_place and _in_a_plane(first):
-            continue
-        if one_place:
+        both = f"{first.name} and {second.name} hold the same forces in every row"
+        if _same_place(first, second):
             del plates[second.name]
             text = f"{both}, at the same place: one plate that is listed twice. {second.name} is left out"
+        elif _in_a_plane(first):
+            continue
         else:
             for plate in (first, second):
                 plates[plate.name] = without_frames(plate, np.ones(recording.n_frames, dtype=bool))
