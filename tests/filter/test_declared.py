@@ -11,7 +11,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.filter.closure import Closure, closure
+from dynakin.filter.ground.closure import Closure, closure
 from dynakin.filter.samples import recording_arrays
 from dynakin.messages import notes_of, warnings_of
 from dynakin.model.definition import load_model

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
-from dynakin.filter.expected import (
+from dynakin.filter.ground.expected import (
     HANDED_OVER_S,
     PIVOT_M,
     SHEAR_SD,
@@ -19,7 +19,7 @@ from dynakin.filter.expected import (
     foot_prior,
     plate_errors,
 )
-from dynakin.filter.shear import Shear
+from dynakin.filter.ground.shear import Shear
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
 from dynakin.recordings.feet.soles import Soles

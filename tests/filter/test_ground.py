@@ -16,10 +16,10 @@ import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.cli.prepared import assumed
 from dynakin.errors import RecordingError
-from dynakin.filter.closure import closure
+from dynakin.filter.ground.closure import closure
+from dynakin.filter.ground.judged import Ground
 from dynakin.filter.impossible import impossible
 from dynakin.filter.sources import LiveSight, with_sources
-from dynakin.filter.total_wrench import Ground
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import MEASURED as FOOT_MEASURED

@@ -11,7 +11,7 @@ import pytest
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.expected import ContactPaths, expected_loads
+from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.samples import Sample, recording_arrays
 from dynakin.filter.tracker import Tracker
 from dynakin.recordings.feet.assignment import foot_loads

@@ -11,8 +11,8 @@ import pytest
 
 import dynakin
 from dynakin import Estimator, Subject, load_model
-from dynakin.filter.plate_clock import MODEL_S, PRIOR_S, Delay, clock_delay
-from dynakin.filter.plate_motion import brought_into_step
+from dynakin.filter.ground.delay import Delay, brought_into_step
+from dynakin.filter.ground.fine_delay import MODEL_S, PRIOR_S, clock_delay
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import recording_arrays
 from dynakin.messages import about
@@ -41,7 +41,7 @@ def delay_of(recording: Recording, ready: Prepared) -> Delay | None:
 def test_a_few_milliseconds_are_found_in_a_walk(moved_s: float) -> None:
     """Within its deviation, and drawn towards none by as much as that asks for."""
     ready = prepared()
-    found = delay_of(brought_into_step(simulate("fullbody", "gait", 7, 4.0).recording, -moved_s), ready)
+    found = delay_of(brought_into_step(simulate("fullbody", "gait", 7, 4.0).recording, Delay(-moved_s, 0.0)), ready)
     assert found is not None and MODEL_S < found.sd_s < 0.0035
     assert found.delay_s == pytest.approx(moved_s * (1.0 - (found.sd_s / PRIOR_S) ** 2), abs=0.0015)
 
@@ -49,7 +49,7 @@ def test_a_few_milliseconds_are_found_in_a_walk(moved_s: float) -> None:
 def test_who_stands_shows_no_delay() -> None:
     recording = simulate("fullbody", "squat", 7, 8.0).recording.window(0.0, 1.2)
     ready = person().prepare(recording)
-    found = delay_of(brought_into_step(recording, -0.01), ready)
+    found = delay_of(brought_into_step(recording, Delay(-0.01, 0.0)), ready)
     assert found is not None and abs(found.delay_s) < 0.002 and found.sd_s > 0.8 * PRIOR_S
 
 
@@ -65,7 +65,7 @@ def test_nothing_is_said_where_forces_are_missing_or_frames_are_few() -> None:
 
 def test_frames_that_show_too_little_are_left_out_and_the_rest_is_asked() -> None:
     ready, recording = prepared(), simulate("fullbody", "gait", 7, 4.0).recording
-    late = brought_into_step(recording, -0.01)
+    late = brought_into_step(recording, Delay(-0.01, 0.0))
     gaps = late.markers.copy()
     known = np.flatnonzero(np.isfinite(ready.wrench).all(axis=1))
     gaps[known[len(known) // 8], 2:] = np.nan
@@ -77,7 +77,7 @@ def test_frames_that_show_too_little_are_left_out_and_the_rest_is_asked() -> Non
 def test_a_run_brings_plates_into_step_and_says_so_where_it_is_not_by_chance() -> None:
     """A frame late: moments are those of plates in step."""
     whole = simulate("fullbody", "gait", 7, 4.0).recording
-    late = brought_into_step(whole, -0.01)
+    late = brought_into_step(whole, Delay(-0.01, 0.0))
     right, found = (person().run(recording) for recording in (whole, late))
     assert found.config["ground"]["plates_behind_s"] == pytest.approx(0.01, abs=0.002)
     assert right.config["ground"]["plates_behind_s"] == 0.0
@@ -92,14 +92,14 @@ def test_a_real_walk_is_found_to_be_moved_as_far_as_it_was(data_dir: Path) -> No
     folder = data_dir / "opencap_subject4"
     walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
     ready = person().prepare(walk)
-    found = [delay_of(brought_into_step(walk, -moved), ready) for moved in (0.0, 0.008)]
+    found = [delay_of(brought_into_step(walk, Delay(-moved, 0.0)), ready) for moved in (0.0, 0.008)]
     assert found[0] is not None and found[1] is not None
     assert found[1].delay_s - found[0].delay_s == pytest.approx(0.008, abs=0.0015)
 
 
 def drifting(recording: Recording, drift: float) -> Recording:
     """Its plates' clock is faster by that part, and right in the middle."""
-    return brought_into_step(recording, -drift * (recording.time - recording.time.mean()))
+    return brought_into_step(recording, Delay(0.0, 0.0, -drift))
 
 
 @pytest.mark.parametrize("drift", [0.03, -0.03])
@@ -119,7 +119,7 @@ def test_a_clock_that_is_faster_or_slower_is_found_and_plates_are_brought_into_s
 
 def with_a_clock_of_its_own(recording: Recording, which: int, late_s: float) -> Recording:
     """One plate later than the others; where it is not known by then it is as it was."""
-    late = brought_into_step(recording, -late_s).plates[which]
+    late = brought_into_step(recording, Delay(-late_s, 0.0)).plates[which]
     whole = recording.plates[which]
     pairs = {name: (getattr(late, name), getattr(whole, name)) for name in ("force", "moment", "cop", "free_moment")}
     own = replace(whole, **{name: np.where(np.isfinite(a), a, b) for name, (a, b) in pairs.items()})
@@ -179,7 +179,7 @@ def test_who_lands_shows_no_few_milliseconds() -> None:
 
 def test_short_gaps_hide_no_delay() -> None:
     """Three frames without markers, blank or not in the file at all."""
-    ready, recording = prepared(), brought_into_step(simulate("fullbody", "gait", 7, 4.0).recording, -0.01)
+    ready, recording = prepared(), brought_into_step(simulate("fullbody", "gait", 7, 4.0).recording, Delay(-0.01, 0.0))
     whole = delay_of(recording, ready)
     assert whole is not None
     markers, wrench = recording_arrays(recording, ready.calibrated)

@@ -14,8 +14,8 @@ import dynakin
 from dynakin import Estimator, Subject, load_model
 from dynakin.arrays import widened
 from dynakin.filter.contacts import carry
-from dynakin.filter.expected import plate_errors
-from dynakin.filter.plate_gain import SENSOR_M
+from dynakin.filter.ground.expected import plate_errors
+from dynakin.filter.ground.gain import SENSOR_M
 from dynakin.filter.prepared import Prepared
 from dynakin.messages import about
 from dynakin.recordings.feet.loads import MEASURED, UNKNOWN

@@ -14,10 +14,12 @@ import pytest
 import dynakin
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import RecordingError
-from dynakin.filter import plate_motion
-from dynakin.filter.plate_clock import UNKNOWN_S
-from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
-from dynakin.filter.shear import NO_SHEAR, found_shear
+from dynakin.filter.ground import axes
+from dynakin.filter.ground.coarse_delay import plates_delay
+from dynakin.filter.ground.delay import Delay, brought_into_step
+from dynakin.filter.ground.fine_delay import UNKNOWN_S
+from dynakin.filter.ground.needed import Needed
+from dynakin.filter.ground.shear import NO_SHEAR, found_shear
 from dynakin.messages import about, warnings_of
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.resampling import low_pass
@@ -63,7 +65,7 @@ def with_forces(
 )
 def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: float) -> None:
     whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
-    late = brought_into_step(whole, -delay_s)
+    late = brought_into_step(whole, Delay(-delay_s, 0.0))
     ready, before = person().prepare(late), person().prepare(whole)
     text = next(text for text in map(str, ready.messages) if "By the motion the plates" in text)
     side = "behind" if delay_s > 0.0 else "ahead of"
@@ -244,7 +246,7 @@ def test_a_force_that_both_feet_share_turns_no_plate(monkeypatch: pytest.MonkeyP
     shared = 30.0 * np.sin(2.0 * np.pi * 0.4 * squat.time)[:, None] * forward_of(squat)
     pushed = with_forces(squat, lambda force: force + shared)
     person().prepare(pushed)
-    monkeypatch.setattr(plate_motion, "EXPLAINS", np.inf)
+    monkeypatch.setattr(axes, "EXPLAINS", np.inf)
     with pytest.raises(RecordingError, match="does not fit the motion"):
         person().prepare(pushed)
 
@@ -398,7 +400,7 @@ def test_another_unit_of_the_forces_of_a_squat_is_named() -> None:
 def test_who_judges_takes_plates_in_step_too() -> None:
     """Held-out trials and identification ask for the plates by themselves."""
     whole = simulate("fullbody", "gait", 7, 4.0).recording
-    late = brought_into_step(whole, -0.04)
+    late = brought_into_step(whole, Delay(-0.04, 0.0))
     calibrated = person().prepare(whole).calibrated
     (there, _), (before, _) = measured_wrench(late, calibrated), measured_wrench(whole, calibrated)
     both = np.isfinite(there).all(axis=1) & np.isfinite(before).all(axis=1)
@@ -407,7 +409,7 @@ def test_who_judges_takes_plates_in_step_too() -> None:
 
 def test_where_plates_end_before_they_are_not_known() -> None:
     whole = simulate("fullbody", "gait", 7, 4.0).recording
-    there = brought_into_step(whole, 0.05)
+    there = brought_into_step(whole, Delay(0.05, 0.0))
     assert np.isnan(there.plates[0].force[-3:]).all()  # for 20 ms the last one is held
     assert np.isfinite(there.plates[0].force[:-3]).all()
 
@@ -435,7 +437,7 @@ def legs_of(recording: Recording) -> Recording:
 def test_legs_alone_show_plates_that_are_out_of_step_by_the_vertical_force(delay_s: float) -> None:
     """By 20 ms a hip was 12 N m off, with nothing said and said to 3."""
     walk = legs_of(simulate("fullbody", "gait", 7, 4.0).recording)
-    ready = person().prepare(brought_into_step(walk, -delay_s))
+    ready = person().prepare(brought_into_step(walk, Delay(-delay_s, 0.0)))
     said = about(ready.messages, "in step")
     assert [message.level for message in said] == ["warning"] * (delay_s != 0.0)
     for message in said:

@@ -35,7 +35,7 @@ def ready(folder: Path) -> Prepared:
     recording = read(folder / "walking1.trc", forces=folder / "walking1_grf.mot")
     model = load_model(folder / "optimized_scale_and_markers.osim", opensim=OpenSimOptions(scale_masses=False))
     with pytest.MonkeyPatch.context() as patch:  # OpenSim takes plates as they come, 5 ms behind
-        patch.setattr("dynakin.filter.total_wrench.clock_delay", lambda *recording: None)
+        patch.setattr("dynakin.filter.ground.known.clock_delay", lambda *recording: None)
         return Estimator(model).prepare(recording)
 
 

@@ -280,7 +280,7 @@ def test_a_foot_that_takes_over_load_may_have_done_so_earlier_or_later(
         return np.array([np.linalg.norm(found.effects[0, 1, 6:12]) for found in looks])
 
     as_it_is = unsure()
-    monkeypatch.setattr("dynakin.filter.expected.HANDED_OVER_S", 0.0)
+    monkeypatch.setattr("dynakin.filter.ground.expected.HANDED_OVER_S", 0.0)
     without = unsure()
     assert (as_it_is[1:4] > 1.01 * without[1:4]).all()
     np.testing.assert_allclose(as_it_is[[0, *range(12, 20)]], without[[0, *range(12, 20)]])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.filter.plate_motion import brought_into_step
+from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.trial import simulate
 from dynakin.stream.session import Live
@@ -49,7 +49,7 @@ def test_plates_in_step_are_left_alone() -> None:
 
 @pytest.mark.parametrize("delay_s", [0.04, -0.03])
 def test_plates_that_are_late_are_brought_into_step(delay_s: float) -> None:
-    frames, said, live = session(brought_into_step(squat(), -delay_s))
+    frames, said, live = session(brought_into_step(squat(), Delay(-delay_s, 0.0)))
     (text,) = [text for text in said if "brought into step" in text]
     side = "behind" if delay_s > 0.0 else "ahead of"
     (at,) = re.findall(

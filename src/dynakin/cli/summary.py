@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from dynakin.cli.console import out, print_error, table
-from dynakin.filter.closure import STATED
+from dynakin.filter.ground.closure import STATED
 from dynakin.messages import about, notes_of
 from dynakin.pipeline.result import Result
 from dynakin.report.findings.finding import Insight

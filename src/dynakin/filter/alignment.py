@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.closure import plates_misfit
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.plate_clock import Delay
-from dynakin.filter.plate_motion import clock_in_words
+from dynakin.filter.ground.closure import plates_misfit
+from dynakin.filter.ground.delay import Delay, clock_in_words
 from dynakin.filter.samples import in_step
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note

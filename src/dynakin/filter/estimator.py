@@ -16,13 +16,14 @@ from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.expected import ContactPaths, expected_loads
-from dynakin.filter.plate_place import off_place
-from dynakin.filter.plate_sum import doubtful_mass
+from dynakin.filter.ground.expected import ContactPaths, expected_loads
+from dynakin.filter.ground.judged import Ground
+from dynakin.filter.ground.known import known_ground
+from dynakin.filter.ground.place import off_place
+from dynakin.filter.ground.plate_sum import doubtful_mass
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.skin import following_skin, may_follow
-from dynakin.filter.total_wrench import Ground, known_ground
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -336,9 +337,9 @@ class Estimator:
         return Tracked(without_lost(estimate), tracker)
 
     def _measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array, Ground]:
-        markers, wrench = recording_arrays(recording, calibrated, gaps=self.noise.recover)
+        markers, _ = recording_arrays(recording, calibrated, gaps=self.noise.recover)
         tolerance = self.noise.plate_load_tolerance
-        ground, known = known_ground(recording, calibrated, markers, wrench, self.plates, tolerance)
+        ground, known = known_ground(recording, calibrated, markers, self.plates, tolerance)
         return markers, known, ground
 
     def measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array]:

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
+from dynakin.filter.ground.judged import Ground
 from dynakin.filter.labels import labels
 from dynakin.filter.sources import ContactSources, hidden_segments
-from dynakin.filter.total_wrench import Ground
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, about
 from dynakin.model.calibration.calibrated import CalibratedModel

@@ -147,7 +147,7 @@ class Noise(Called, use_attribute_docstrings=True):
     does not have bears on them. Not given: they always are."""
     plate_delay_sd_s: NotNegative = 0.02
     """Prior standard deviation of the plates' delay behind the markers, s, of a model that is fixed in the ground; 0:
-    none is estimated. Of one with feet it is found before (`filter.plate_clock`)."""
+    none is estimated. Of one with feet it is found before (`filter.ground.fine_delay`)."""
     total_mass_variance_kg2: Positive = scale(0.25, "kg²", "doubt about the total mass")
     """Variance of the declared total mass, kg^2."""
     total_mass_use: Literal["frame", "prior"] = "prior"

@@ -1,5 +1,5 @@
-"""Do the plates carry the person, at this moment? What `filter.closure` asks of a whole recording, some tenths of a
-second later."""
+"""Do the plates carry the person, at this moment? What `filter.ground.closure` asks of a whole recording, some
+tenths of a second later."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections import deque
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.closure import EDGE, EXCESS
-from dynakin.filter.mass_centre import CentreWeights
+from dynakin.filter.ground.closure import EDGE, EXCESS
+from dynakin.filter.ground.mass_centre import CentreWeights
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.units import GRAVITY_M_S2
 

@@ -12,9 +12,9 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.declared import may_bear
-from dynakin.filter.expected import ContactPaths, expected_loads
-from dynakin.filter.shear import NO_SHEAR, VERTICAL_ONLY, Shear
+from dynakin.filter.ground.declared import may_bear
+from dynakin.filter.ground.expected import ContactPaths, expected_loads
+from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.belt import WINDOW_S, velocities
 from dynakin.recordings.feet.contact import (

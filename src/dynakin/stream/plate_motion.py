@@ -1,4 +1,4 @@
-"""Are the plates in step with the markers, and are their axes right? What `filter.plate_motion` asks of a recording, of
+"""Are the plates in step with the markers, and are their axes right? What `filter.ground` asks of a recording, asked of
 the last seconds of a session."""
 
 from __future__ import annotations
@@ -9,9 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.plate_clock import Delay
-from dynakin.filter.plate_motion import Needed, plates_delay, turned_axes
-from dynakin.filter.plate_sum import doubtful_mass
+from dynakin.filter.ground.axes import turned_axes
+from dynakin.filter.ground.coarse_delay import plates_delay
+from dynakin.filter.ground.delay import Delay
+from dynakin.filter.ground.needed import Needed
+from dynakin.filter.ground.plate_sum import doubtful_mass
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.orientation import axis_vector

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.plate_motion import out_of_step_in_words
+from dynakin.filter.ground.delay import out_of_step_in_words
 from dynakin.messages import Message, about, note, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.plates.stuck import frozen_live_in_words

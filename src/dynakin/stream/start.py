@@ -10,7 +10,7 @@ import numpy as np
 from dynakin.elements import element
 from dynakin.errors import ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.plate_sum import doubtful_mass
+from dynakin.filter.ground.plate_sum import doubtful_mass
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, about, note, notes_of, warning, warnings_of
 from dynakin.model.calibration.body import steady_load

@@ -12,8 +12,8 @@ from dynakin.blas import one_blas_thread
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.plate_sum import doubtful_mass
-from dynakin.filter.total_wrench import known_ground
+from dynakin.filter.ground.known import known_ground
+from dynakin.filter.ground.plate_sum import doubtful_mass
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -213,9 +213,8 @@ def measured_wrench(
             f"{recording.path or recording.name}: no force plates, expected at least one: what is predicted is "
             "judged by them (--forces)"
         )
-    wrench = initial.ground.wrench_to_ground(recording.total_wrench())
     markers = marker_paths(recording, initial, initial.ground)
-    ground, wrench = known_ground(recording, initial, markers, wrench, plates, tolerance)
+    ground, wrench = known_ground(recording, initial, markers, plates, tolerance)
     doubt = doubtful_mass(wrench, initial.weighed_kg, ground.load_ratio, initial.unseen_kg)
     warnings = warnings_of([*ground.notes, *([doubt] if doubt else [])])
     if not np.isfinite(wrench).all(axis=1).any():

@@ -12,7 +12,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from dynakin.arrays import wrench_about
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.expected import ContactPaths
+from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.prepared import Prepared
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.inverse_kinematics import fixed_model, inverse_kinematics

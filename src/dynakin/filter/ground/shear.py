@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.plate_motion import Needed
+from dynakin.filter.ground.needed import Needed
 from dynakin.messages import Message, warning
 
 Array = npt.NDArray[np.float64]

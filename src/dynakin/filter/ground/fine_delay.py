@@ -1,7 +1,7 @@
 """By how much plates and markers are out of step, to a millisecond or two: what the motion of the whole body needs,
 forces and moments, against what the plates say.
 
-The centre of mass as a mean of markers (`plate_motion`) finds tens of milliseconds; a few are lost in skin that follows
+The centre of mass as a mean of markers (`coarse_delay`) finds tens of milliseconds; a few are lost in skin that follows
 the joints, and a filter takes them up by acceleration. Inverse kinematics frame by frame has neither, and what is not
 known of segments' inertia, which looks like a delay as well, is estimated with it ([derivations](derivations.md),
 section 11).
@@ -18,6 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.arrays import runs, wrench_about
 from dynakin.bindings import _core
+from dynakin.filter.ground.delay import Delay
 from dynakin.filter.samples import in_step
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.inverse_kinematics import FEWEST_MARKERS, inverse_kinematics
@@ -32,15 +33,13 @@ Flags = npt.NDArray[np.bool_]
 
 CUTOFF_HZ = 6.0
 """Low-pass of motion and plates, of one delay: none."""
-LEAST_S, LEAST_SD = 0.001, 0.7
-"""A lesser delay, or one of fewer of its standard deviations, is none."""
 PRIOR_S = 0.01
 """How far out of step plates are that nobody complained of: a frame at 100 Hz."""
 MODEL_S = 0.002
 """What joints, skin and segments that are not rigid do besides: by `truth3d`'s walks 0.3 to 1.3 ms."""
-MODEL_LEGS_S, LEGS_SD = 0.005, 2.0
+MODEL_LEGS_S = 0.005
 """The same of a body that is not marked whole, of which the vertical force alone is asked (an unseen trunk leans, and
-goes up and down with the pelvis); and a delay of fewer of its deviations is none. Chosen on `truth3d`'s seeds 1 to 4
+goes up and down with the pelvis). Chosen on `truth3d`'s seeds 1 to 4
 without their upper bodies' markers, whose plates are 2 ms late: 5.2 to 7.9 found in walks, -0.9 to 8.5 in squats, 1.6
 deviations at most. 3.7 to 9.8 and -2.2 to 7.3 in seeds 61 to 64, real ones within 1.6 deviations (`walking1` 12.6 and
 of the whole body 5)."""
@@ -91,36 +90,6 @@ a drift of 2 %, and leave 40 to 65 less; of drifts of 1 and 2 % plates' own dela
 DRIFT_LEFT = 1.0
 """And none where motion and plates then disagree by more than the noise: 0.03 to 0.65 of its variance are left in these
 trials. Who squats with 10 kg in the hands leaves 0.9 and looks like a drift of 0.8 %, so that nobody asks then."""
-
-
-class Delay(NamedTuple):
-    """By how much plates lag behind the markers, s, and its standard deviation: in the middle of a recording where they
-    lag ``drift`` seconds more each second, as plates do whose clock is faster by that part; and each plate (P,) lags so
-    much more that is ``apart``, where they have not one clock."""
-
-    delay_s: float
-    sd_s: float
-    drift: float = 0.0
-    drift_sd: float = 0.0
-    apart: tuple[float, ...] = ()
-
-    def lags(self, time: Array) -> Array:
-        """(T,) s, at the times (T,) s of the recording."""
-        return np.asarray(self.delay_s + self.drift * (time - 0.5 * (time[0] + time[-1])))
-
-    def after(self, other: Delay) -> Delay:
-        """Of plates that were brought into step by another."""
-        apart = np.add(self.apart or 0.0, other.apart or 0.0) if self.apart or other.apart else np.zeros(0)
-        sd = max(self.sd_s, other.sd_s) if other.apart else self.sd_s  # some plates' own delays may not be known
-        return self._replace(delay_s=self.delay_s + other.delay_s, sd_s=sd, apart=tuple(apart.tolist()))
-
-    def worth_it(self, whole: bool) -> bool:
-        """Whether it is worth bringing the plates into step, of a body that is marked whole or not."""
-        return bool(self.drift or self.apart) or self.beyond(LEAST_S, LEAST_SD if whole else LEGS_SD)
-
-    def beyond(self, least_s: float, sigmas: float) -> bool:
-        """Whether it is longer than so much, and than so many of its standard deviations."""
-        return abs(self.delay_s) > max(least_s, sigmas * self.sd_s)
 
 
 def clock_delay(

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.filter.ground.judged import Ground
 from dynakin.filter.limbs import unseen_limbs
-from dynakin.filter.total_wrench import Ground
 from dynakin.messages import Message, about, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.naming import listed

@@ -17,8 +17,8 @@ import scipy.linalg
 
 from dynakin.arrays import filled, mean_seen
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
-from dynakin.filter.plate_gain import SENSOR_M
-from dynakin.filter.shear import NO_SHEAR, Shear
+from dynakin.filter.ground.gain import SENSOR_M
+from dynakin.filter.ground.shear import NO_SHEAR, Shear
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED

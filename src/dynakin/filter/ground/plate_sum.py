@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import runs
-from dynakin.filter.closure import Closure, closure
-from dynakin.filter.declared import bearing
-from dynakin.filter.shear import not_zeroed
+from dynakin.filter.ground.closure import Closure, closure
+from dynakin.filter.ground.declared import bearing
+from dynakin.filter.ground.shear import not_zeroed
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import scipy
 
 from dynakin.arrays import runs, widened
-from dynakin.filter.closure import Closure
+from dynakin.filter.ground.closure import Closure
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.plates.ground_plate import GroundPlate

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms_length, runs, widened
-from dynakin.filter.mass_centre import mass_centre
+from dynakin.filter.ground.mass_centre import mass_centre
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.times import rate_of
 from dynakin.units import GRAVITY_M_S2

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import mean_seen
-from dynakin.filter.mass_centre import second_derivative
-from dynakin.filter.plate_motion import Needed
+from dynakin.filter.ground.mass_centre import second_derivative
+from dynakin.filter.ground.needed import Needed
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.units import GRAVITY_M_S2
 

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.closure import SMOOTH_S, smoothed
-from dynakin.filter.plate_motion import Needed
+from dynakin.filter.ground.closure import SMOOTH_S, smoothed
+from dynakin.filter.ground.needed import Needed
 from dynakin.messages import Message, warning
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.recording import Plate

@@ -1,0 +1,314 @@
+"""What feet, plates and the motion say of the ground, of plates that are in step: who stands where, and whether that
+carries the person."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import RecordingError
+from dynakin.filter.ground.axes import turned_axes
+from dynakin.filter.ground.carried import carried_in_hands, carried_in_words
+from dynakin.filter.ground.coarse_delay import plates_delay
+from dynakin.filter.ground.declared import may_bear, plate_of_its_own
+from dynakin.filter.ground.delay import Delay, brought_into_step
+from dynakin.filter.ground.expected import ContactPaths
+from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
+from dynakin.filter.ground.needed import Needed
+from dynakin.filter.ground.plate_sum import judged_by_motion
+from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
+from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear
+from dynakin.messages import Message, note, warning
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.checks import PlateCheck, check_plates
+from dynakin.recordings.feet import loads as on_plates
+from dynakin.recordings.feet.assignment import check_assigned, foot_loads
+from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.low_passed import found_low_pass
+from dynakin.recordings.plates.axes import turned_feet
+from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.plates.stuck import vertical_only
+from dynakin.recordings.recording import Recording
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What is known of the ground reaction over a recording.
+
+    Attributes:
+        loads: of each foot; None of a model that stands on its root.
+        undeclared: (T,) frames in which something bears or pulls the person that no plate measures (a seat, a rail, a
+            cable), wherever it acts: of the moments only those between the plates and the thighs are known.
+        bears: (T, C) frames in which each declared contact bears, or may, where no plate measures it.
+        usable: whether the plates are used at all.
+        load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
+        shear: by how much the plates' horizontal forces are off.
+        off_gain: (T, F) part of its load by which the plate under each foot may be off; None: nothing contradicts it.
+        notes: what there is to say. reasons: those of them that say why something is not measured.
+        behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how far they
+            may be out of it still; 0: no farther than usual.
+    """
+
+    loads: FootLoads | None
+    undeclared: Flags
+    bears: Flags
+    usable: bool
+    load_ratio: float | None
+    notes: tuple[Message, ...]
+    reasons: tuple[Message, ...]
+    shear: Shear = NO_SHEAR
+    off_gain: Array | None = None
+    behind_s: float = 0.0
+    clock_sd_s: float = 0.0
+
+
+class Trial(NamedTuple):
+    """What is judged: markers (T, M, 3) m, of the model, ground frame; assigned, tolerance: as for `known_ground`."""
+
+    recording: Recording
+    initial: CalibratedModel
+    markers: Array
+    assigned: Mapping[str, str] | None
+    tolerance: float | None
+
+    @property
+    def wrench(self) -> Array:
+        """(T, 6) N and N m of all plates, ground frame; NaN where one of them is not measured."""
+        if not self.recording.plates:
+            return np.full((self.recording.n_frames, 6), np.nan)
+        total = self.initial.ground.wrench_to_ground(self.recording.total_wrench())
+        return np.where(np.isfinite(total).all(axis=1, keepdims=True), total, np.nan)
+
+    @property
+    def wrenches(self) -> Array:
+        """(P, T, 6) of each plate."""
+        return np.stack([self.initial.ground.wrench_to_ground(plate.wrench) for plate in self.recording.plates])
+
+    def in_step(self, delay: Delay) -> Trial:
+        """The same of what the plates say so much later."""
+        return self._replace(recording=brought_into_step(self.recording, delay))
+
+    def without_plates(self) -> Trial:
+        """The same of the markers alone."""
+        return self._replace(recording=self.recording.with_plates(()), assigned=None)
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """Who stands where, by feet and plates.
+
+    Attributes:
+        loads: of each foot; None of a model that stands on its root.
+        may: (T, C) frames in which each declared contact may bear. by_plate: (C,) those that a plate measures; taken:
+            a plate that is one's though nobody said so.
+        check: of the plates; None without any. shear: what is known of their horizontal forces before they are judged.
+        needed: what the motion needs; None of a model that stands on its root.
+    """
+
+    trial: Trial
+    loads: FootLoads | None
+    may: Flags
+    by_plate: list[bool]
+    taken: str | None
+    check: PlateCheck | None
+    shear: Shear
+    needed: Needed | None
+
+    @staticmethod
+    def of(trial: Trial) -> Standing:
+        """Of a trial.
+
+        Raises:
+            RecordingError: the plates are refused.
+        """
+        recording, initial = trial.recording, trial.initial
+        loads = _loads_of_feet(trial)
+        paths, may = _declared_contacts(initial, trial.markers)
+        taken = None if loads is None else plate_of_its_own(recording, initial, loads, paths, may)
+        if taken is not None:
+            own = {**(trial.assigned or {}), taken: next(iter(initial.contacts))}
+            loads = _loads_of_feet(trial._replace(assigned=own))
+        by_plate = [loads is not None and name in loads.others for name in initial.contacts]
+        may &= ~np.array(by_plate, dtype=bool)
+        found = Standing(trial, loads, may, by_plate, taken, None, NO_SHEAR, None)
+        if not recording.plates:
+            return found
+        # steps off the plates: their mean load is no mass
+        mass = None if initial.feet else initial.weighed_kg
+        steps_kg = initial.weighed_kg if initial.feet and not initial.contacts else None
+        check = check_plates(recording, initial.ground, mass, initial.markers_on_feet, loads, steps_kg)
+        if check.refusal:
+            raise RecordingError(
+                f"{recording.plates_file}: {check.refusal}{_how_to_give(initial, loads, check.under_no_foot)}"
+            )
+        if check.unused:
+            return replace(found, check=check)
+        shear = Shear(unmeasured=True) if vertical_only(recording) else NO_SHEAR
+        if shear.unmeasured and loads is None:
+            raise RecordingError(
+                f"{recording.plates_file}: the plates measure the vertical force only (horizontal forces are 0, or "
+                "follow it), and this model takes all of the force: export the horizontal forces as well"
+            )
+        needed = None if loads is None else Needed(initial, recording.time, trial.markers)
+        if needed is not None and loads is not None and not shear.unmeasured:
+            wrong = turned_axes(needed, recording.plates, initial, loads.total_known)
+            if wrong:
+                raise RecordingError(f"{recording.plates_file}: {wrong}")
+        return replace(found, check=check, shear=shear, needed=needed)
+
+    def coarse_delay(self) -> Delay | None:
+        """By how much the plates lag, to some milliseconds; None where they are in step, or nothing can be said."""
+        if self.needed is None or self.loads is None:
+            return None
+        needed = self.needed.vertically() if self.shear.unmeasured else self.needed
+        return plates_delay(needed, self._total(self.loads, self.needed))
+
+    def judged(self) -> tuple[Ground, Array]:
+        """Whether that carries the person, by the motion as well; and the total wrench (T, 6), NaN where it does
+        not."""
+        if self.check is None:
+            return self._without_plates()
+        if self.check.unused:
+            ground, nothing = Standing.of(self.trial.without_plates()).judged()
+            loads = ground.loads
+            if loads is not None:  # the recording keeps its plates, with nobody on any
+                on = np.zeros((len(nothing), len(loads.feet), len(self.trial.recording.plates)), dtype=bool)
+                loads = replace(loads, on=on)
+            return replace(ground, loads=loads, notes=(*self.check.messages, *ground.notes)), nothing
+        return self._by_motion(self.check)
+
+    def _without_plates(self) -> tuple[Ground, Array]:
+        text = (
+            "No force plates: the ground reaction follows from the motion where one foot may stand, and where both may "
+            "how they divide it is assumed; inertial parameters stay as the table has them."
+        )
+        said, wrench = note("plates", text), self.trial.wrench
+        nowhere = np.zeros(len(wrench), dtype=bool)
+        return Ground(self.loads, nowhere, self.may, False, None, (said,), (said,)), wrench
+
+    def _by_motion(self, check: PlateCheck) -> tuple[Ground, Array]:
+        trial, loads, n = self.trial, self.loads, self.trial.recording.n_frames
+        recording, initial = trial.recording, trial.initial
+        notes, shear, gains = list[Message](), self.shear, NO_GAINS
+        if self.taken is not None:
+            notes.append(note("plates", _taken_in_words(self.taken, next(iter(initial.contacts)))))
+        wrench = trial.wrench
+        all_of_it, righted = wrench, None
+        if self.needed is not None and loads is not None:
+            all_of_it = self._all_of_it(self.needed)
+            said, shear, gains = self._sensors(self.needed, loads)
+            notes += said
+            righted = gains.righted(wrench, trial.wrenches)
+        turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
+        wrenches = [shear.zeroed(each) for each in (all_of_it, righted) if each is not None]
+        judged = judged_by_motion(
+            recording, initial, trial.markers, wrenches, loads, check, self.may, self.by_plate, trial.tolerance
+        )
+        notes += [*check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
+        reasons = [*([VERTICAL_ONLY] if shear.unmeasured else []), *judged.reasons]
+        undeclared = judged.undeclared
+        if loads is not None:
+            before = loads
+            loads = loads.with_borne(np.asarray(judged.bears.any(axis=1))).with_undeclared(undeclared)
+            loads = loads.without(judged.beyond)
+            reasons += _light_feet(before, loads, judged.beyond)
+        partly = undeclared if loads is None else ~loads.total_known | shear.unmeasured
+        wrench = np.where(partly[:, None], np.nan, wrench)
+        used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
+        if loads is not None or used < n:
+            notes.append(note("plates", f"The total wrench is measured in {used} of {n} frames."))
+        notes += reasons
+        texts = tuple(notes), tuple(reasons)
+        off_gain = None if loads is None or not gains.notes else gains.of_feet(loads)
+        return Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, *texts, shear, off_gain), wrench
+
+    def _sensors(self, needed: Needed, loads: FootLoads) -> tuple[list[Message], Shear, PlateGains]:
+        """What the motion says of the rate, of what is carried, or else of the plates' horizontal forces and gains."""
+        initial, recording, total = self.trial.initial, self.trial.recording, self._total(loads, needed)
+        if initial.contacts:
+            return [], self.shear, NO_GAINS
+        found = fitting_rate(needed, total)
+        if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
+            return [warning("rate", wrong_rate_in_words(needed.rate, *found))], self.shear, NO_GAINS
+        if (load_kg := carried_in_hands(needed, initial, self.trial.markers, total)) is not None:
+            return [warning("carried", carried_in_words(load_kg))], self.shear, NO_GAINS
+        if self.shear.unmeasured:
+            return [], self.shear, NO_GAINS
+        shear = found_shear(needed, total)
+        gains = found_gains(needed, recording.plates, self.trial.wrenches, loads.total_known)
+        return [*shear.notes, *gains.notes], shear, gains
+
+    def _all_of_it(self, needed: Needed) -> Array:
+        """The total wrench (T, 6), with the motion's horizontal force where plates have none."""
+        wrench = self.trial.wrench
+        return needed.with_horizontal(wrench) if self.shear.unmeasured else wrench
+
+    def _total(self, loads: FootLoads, needed: Needed) -> Array:
+        """(T, 3) N of all plates, where that is all that bears the person; NaN elsewhere."""
+        return np.where(loads.total_known[:, None], self._all_of_it(needed)[:, :3], np.nan)
+
+
+def _loads_of_feet(trial: Trial) -> FootLoads | None:
+    """What each foot carries by feet and plates; None of a model that stands on its root."""
+    recording, initial, assigned = trial.recording, trial.initial, trial.assigned
+    if not initial.feet:  # it takes all plates together, and is told wrong names all the same
+        check_assigned(assigned or {}, recording, ("right", "left"))
+        return None
+    loads = foot_loads(
+        recording, initial.ground, initial.markers_on_feet, assigned=assigned, others=list(initial.contacts)
+    )
+    if not initial.unmarked_feet:
+        return loads
+    hidden = np.isin(loads.feet, list(initial.unmarked_feet))
+    loads = loads.without(np.tile(hidden, (recording.n_frames, 1)))
+    text = (
+        f"No markers of the {' and the '.join(initial.unmarked_feet)} foot that show where it stands: what it carries "
+        "is not known. Moments are those of a leg whose own foot is on a plate, or in the air."
+    )
+    return replace(loads, reasons=(*loads.reasons, note("plates", text)))
+
+
+def _declared_contacts(initial: CalibratedModel, markers: Array) -> tuple[Array, Flags]:
+    """(T, 1 + C, 3) m where the root and the declared contacts are, NaN where none is declared; (T, C) frames in which
+    each of these may bear."""
+    if not initial.contacts:
+        return np.full((len(markers), 1, 3), np.nan), np.zeros((len(markers), 0), dtype=bool)
+    paths = ContactPaths.of(initial).at(markers)
+    floor = float(np.nanmin(markers[..., 1]))
+    return paths, may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor)
+
+
+def _taken_in_words(plate: str, contact: str) -> str:
+    return (
+        f"{plate} is taken as the {contact}'s: no foot stands on it, and it presses where the {contact} is. If it is "
+        f'not, name whose it is in a configuration: plates = {{ "{plate}" = "right" }}.'
+    )
+
+
+def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str | None) -> str:
+    """What to do about a plate that is refused for where it is pressed while a declared contact has none."""
+    names = [name for name in initial.contacts if loads is not None and name not in loads.others]
+    if not names or plate is None:
+        return ""
+    return f'. If {plate} bears the {names[0]}, say so in a configuration: plates = {{ "{plate}" = "{names[0]}" }}'
+
+
+def _light_feet(before: FootLoads, loads: FootLoads, beyond: Flags) -> list[Message]:
+    """Sentences on feet whose plate was measured and reads next to nothing where something undeclared bears."""
+    found = list[Message]()
+    for k, foot in enumerate(loads.feet):
+        light = (loads.reason[:, k] != before.reason[:, k]) & (before.reason[:, k] == on_plates.MEASURED)
+        if (light & ~beyond[:, k]).any():
+            text = (
+                f"In {np.count_nonzero(light & ~beyond[:, k])} of these frames the {foot} foot's plate reads less "
+                f"than {LOADED_N:g} N: what the foot carries there is not known."
+            )
+            found.append(note("plates", text))
+    return found

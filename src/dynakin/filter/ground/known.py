@@ -1,0 +1,146 @@
+"""What is known of the ground: when the plates carry all of the person, and which foot's wrench is measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in_words, out_of_step_in_words
+from dynakin.filter.ground.fine_delay import UNKNOWN_S, clock_delay
+from dynakin.filter.ground.judged import Ground, Standing, Trial
+from dynakin.filter.ground.plate_sum import MASS_APART
+from dynakin.messages import Message, about, note, warning
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.feet.zero_offset import without_offsets
+from dynakin.recordings.recording import Recording
+from dynakin.units import GRAVITY_M_S2
+
+Array = npt.NDArray[np.float64]
+
+SUPPORT = 0.03
+"""Part of the weight by which the plates' load would be farther from it without what is read beside the feet: then
+that is no zero but a rail or a hand's plate, which bears so much."""
+ROUNDS = 3
+"""Once single plates are in step, more frames may be known, and others are found not to be; what a body that is not
+marked whole shows is drawn towards none, and farther off than the fine search reaches."""
+CLOCK_UNKNOWN = (
+    "Whether plates and markers are in step within some milliseconds is not known here: it takes half a second of a "
+    "movement in which the plates carry all of the person, never more than twice the weight, and no declared contact. "
+    "Deviations of moments hold a few."
+)
+CLOCK_OF_LEGS = ", which may be none: not all of the body is marked. Deviations of moments hold it."
+
+
+def known_ground(
+    recording: Recording,
+    initial: CalibratedModel,
+    markers: Array,
+    assigned: Mapping[str, str] | None = None,
+    tolerance: float | None = None,
+) -> tuple[Ground, Array]:
+    """What is known of the ground, and the total wrench (T, 6) without (NaN) the frames in which the plates do not
+    carry all of the person; of plates that are in step, or brought into it.
+
+    Args:
+        markers: (T, M, 3) m, of the model, ground frame. assigned: plate -> foot, as for `foot_loads`.
+        tolerance: part of the weight by which the plates' mean may differ where `closure` cannot judge; None: nobody
+            asks.
+
+    Raises:
+        RecordingError: the plates are refused.
+    """
+    trial, zeros = _zeroed(Trial(recording, initial, markers, assigned, tolerance))
+    as_it_is = Standing.of(trial)
+    coarse = as_it_is.coarse_delay()
+    standing = as_it_is if coarse is None else Standing.of(trial.in_step(coarse))
+    ground, known = standing.judged()
+    clock = _Clock(coarse, 0.0 if coarse is None else coarse.sd_s, ())
+    if ground.loads is not None and ground.loads.on.any():
+        clock, ground, known = _clock(trial, as_it_is, coarse, ground, known)
+    moved = () if clock.taken is None else (_taken_in_words(clock.taken, recording, not initial.unseen_kg),)
+    behind_s = 0.0 if clock.taken is None else clock.taken.delay_s
+    notes = (*zeros, *moved, *ground.notes, *clock.notes)
+    return replace(ground, notes=notes, behind_s=behind_s, clock_sd_s=clock.sd_s), known
+
+
+class _Clock(NamedTuple):
+    """What delay is taken off the plates (None: none), how far they may be out of step still, and what there is to say
+    of it."""
+
+    taken: Delay | None
+    sd_s: float
+    notes: tuple[Message, ...]
+
+
+def _clock(
+    trial: Trial, as_it_is: Standing, coarse: Delay | None, ground: Ground, known: Array
+) -> tuple[_Clock, Ground, Array]:
+    """How far the plates are out of step, to a millisecond or two where the movement shows it, and what is known of
+    the ground once they are not.
+
+    Args:
+        coarse: the delay that ``ground`` and ``known`` (T, 6) are without.
+    """
+    initial, time = trial.initial, trial.recording.time
+    whole, fine, left = not initial.unseen_kg, None, None
+    for _ in range(ROUNDS):
+        plates = trial.in_step(fine or coarse or IN_STEP).wrenches
+        left = clock_delay(initial, time, trial.markers, known, not about(ground.notes, "carried"), plates)
+        if left is None or not left.worth_it(whole or coarse is not None or fine is not None):
+            break
+        fine = left.after(fine or coarse or IN_STEP)
+        ground, known = Standing.of(trial.in_step(fine)).judged()
+        if whole and not left.apart:
+            break
+    if fine is not None and fine.worth_it(whole):
+        return _Clock(fine, fine.sd_s, ()), ground, known
+    if fine is not None:  # the coarse search had them out of step
+        left, coarse = fine, None
+        ground, known = as_it_is.judged()
+    if left is None:
+        said = () if coarse else (note("sum of the plates", CLOCK_UNKNOWN),)
+        return _Clock(coarse, coarse.sd_s if coarse else UNKNOWN_S, said), ground, known
+    if whole:  # the coarse search's deviation gives way to the finer one's
+        return _Clock(coarse, left.sd_s if coarse else 0.0, ()), ground, known
+    said = () if coarse else (note("sum of the plates", f"{out_of_step_in_words(left)}{CLOCK_OF_LEGS}"),)
+    return _Clock(coarse, float(np.hypot(left.delay_s, left.sd_s)), said), ground, known
+
+
+def _taken_in_words(delay: Delay, recording: Recording, whole: bool) -> Message:
+    """That the plates were brought into step."""
+    if delay.drift:
+        found = drift_in_words(delay, recording.time)
+        text = f"{found}; they were brought into step. Correct the rate, or the times, in the file that is wrong."
+        return warning("rate", text)
+    if delay.apart:
+        found = apart_in_words(delay, [plate.name for plate in recording.plates])
+        return warning("in step", f"{found}; they were brought into step.")
+    text = f"{out_of_step_in_words(delay)}; they were brought into step."
+    if whole:
+        return note("in step", text)
+    return warning("in step", f"{text} Not all of the body is marked, so that no better is known.")
+
+
+def _zeroed(trial: Trial) -> tuple[Trial, list[Message]]:
+    """The trial without what its plates read while nobody is on them, with sentences on it; as it is where a
+    contact is declared, which may bear on any plate, or where the person weighs no less than all of it."""
+    initial = trial.initial
+    if not initial.feet or initial.contacts:
+        return trial, []
+    recording, said = without_offsets(trial.recording, initial.ground, initial.markers_on_feet)
+    if recording is trial.recording:
+        return trial, said
+    zeroed = trial._replace(recording=recording)
+    before, after = (abs(_median_load(each) / (initial.weighed_kg * GRAVITY_M_S2) - 1.0) for each in (trial, zeroed))
+    bears = before < MASS_APART and after - before > SUPPORT
+    return (trial, []) if bears else (zeroed, said)
+
+
+def _median_load(trial: Trial) -> float:
+    """N, of all plates."""
+    load = trial.wrench[:, 1]
+    return float(np.median(load[np.isfinite(load)])) if np.isfinite(load).any() else 0.0
