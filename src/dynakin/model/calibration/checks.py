@@ -23,8 +23,6 @@ Array = npt.NDArray[np.float64]
 BENT_DEG = 30.0
 """Of a knee, or of a thigh against the vertical, from which on a standing trial is doubted: in the standing trials that
 we have, and simulated ones, 1 to 17; with one leg ahead or lifted 25; a deep squat and sitting 74 to 99."""
-SITS_DEG = 75.0
-"""Of both knees, beyond which nobody stands: a severe crouch gait has 60."""
 _NOWHERE = (np.nan, np.nan, np.nan)
 
 
@@ -54,15 +52,11 @@ def refuse_moving_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder)
                 )
 
 
-def check_standing(landmarks: Mapping[str, Array], name: str, *, given: bool) -> list[Message]:
+def check_standing(landmarks: Mapping[str, Array], name: str) -> list[Message]:
     """A warning where somebody who holds still does so with bent legs: a squat, or sitting.
 
     Args:
-        landmarks: of the frames on which places are measured, Y up. name: of the recording. given: as the standing
-            trial.
-
-    Raises:
-        ModelError: given as the standing trial, of somebody who cannot be standing.
+        landmarks: of the frames on which places are measured, Y up. name: of the recording.
     """
     bent: dict[str, float] = {}
     for side, word in (("r", "right"), ("l", "left")):
@@ -76,9 +70,6 @@ def check_standing(landmarks: Mapping[str, Array], name: str, *, given: bool) ->
         return []
     of = "against the vertical" if worst.endswith("thigh") else "bent"
     said = f"nobody stands upright in {name}: the {worst} is {bent[worst]:.0f} deg {of}"
-    if given and all(bent[knee] > SITS_DEG for knee in ("right knee", "left knee")):
-        expected = "a standing trial of the person upright with straight knees (--static)"
-        raise ModelError(f"{said}, expected {expected}", asks_for="static")
     return [
         warning(
             "standing",

@@ -322,7 +322,7 @@ def _landmarks(
         reasons = dict.fromkeys(source.match.left_out.values())
         raise error.reworded("; ".join([error.message, *reasons])) from None
     if still.stands:
-        messages += check_standing(found.landmarks, source.recording.name, given=asked.static is not None)
+        messages += check_standing(found.landmarks, source.recording.name)
     supposed = supposed_legs(found, legs, marked.chosen)
     if supposed and not still.stands:
         raise no_legs(supposed, source, asked.static, legs, finder)
