@@ -39,8 +39,8 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 MISFIT = 1.6
-"""Times `Sizes.placed` from which a run says that a model was not scaled well: by truth 0.6 to 1.1 with the person's
-own skeleton, 2.5 to 3.2 with one scaled by hand."""
+"""Times `Sizes.placed` from which a run says that a model was not scaled well: by truth 0.4 to 1.1 with the person's
+own skeleton, 2.3 to 3.2 with one scaled by hand."""
 ROOT_SKIN = 4.0
 """Times as much skin as elsewhere counts on the segment that floats (the pelvis): what its markers do together no other
 segment contradicts. By `truth3d` its rotation was said to a third of its error (0.18 of 0.53 deg in walks)."""
