@@ -581,7 +581,7 @@ def test_a_skeleton_whose_markers_lie_elsewhere_has_centres_of_joints_that_are_a
     assert (
         subject.misfit(x) == []
         and "12 mm" in subject.misfit(moved)[0].text
-        and "2.4 times" in subject.misfit(moved)[0].text
+        and "4.0 times" in subject.misfit(moved)[0].text
     )
     none = {kind: dict.fromkeys(BLOCKS, np.zeros((3, 1))) for kind in (*KINDS, "inertia")}
     centres = none | dict.fromkeys(("hinge_centre", "ball_centre"), dict.fromkeys(BLOCKS, np.ones((3, 1))))
