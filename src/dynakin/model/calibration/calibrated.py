@@ -28,7 +28,8 @@ UNMARKED_SHARE = 0.09
 
 HEAVY_KG_M2 = 32.0
 """Body mass index beyond which a belly counts. The tables' persons have 20 to 28; 25 kg more on the trunk of somebody
-of 1.70 m (34 kg/m2) moved L5/S1 by 25 N m in simulated walks, 22 kg that lie 4 cm farther in front by 48, and 30 kg/m2 is short persons of any build as well."""
+of 1.70 m (34 kg/m2) moved L5/S1 by 25 N m in simulated walks, 22 kg that lie 4 cm farther in front by 48, and 30 kg/m2
+is short persons of any build as well."""
 
 
 @dataclass(frozen=True, eq=False)
