@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
 from dynakin.results.measures.feet import foot_sources
-from dynakin.results.measures.power import work, work_of
+from dynakin.results.measures.power import work_of
 from dynakin.results.measures.stances import compared_stances
 
 Array = npt.NDArray[np.float64]
@@ -59,29 +59,30 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
     power = sources.measured_only(estimate.powers(), sources.moment_sources(estimate.data))
     stances, legs = compared_stances(estimate, window), sources.legs_of(estimate.data)
     start, end = int(np.flatnonzero(window)[0]), int(np.flatnonzero(window)[-1]) + 1
-    found: dict[str, Any] = {}
+    sizes: dict[str, dict[str, tuple[float, float]]] = {}
     held = estimate.held
     for name, *sides in paired(estimate.coordinate_names):
         if any(estimate.coordinate_names[k] in held for k in sides):
             continue  # nothing is known of that side
         parts = [[slice(start, end)] if stances is None or not legs[k] else stances[legs[k]] for k in sides]
-        magnitudes = {
-            "peak_moment": [_mean(_largest, moments[:, k], own) for k, own in zip(sides, parts, strict=True)],
-        }
-        for key, sign in (("positive_work", 1.0), ("negative_work", -1.0)):
-            magnitudes[key] = [
-                _mean(lambda own, at, sign=sign: work_of(at, sign * own).positive_j, power[:, k], own, time)
-                for k, own in zip(sides, parts, strict=True)
-            ]
-        magnitudes = {"range": [_range(angles[:, k]) for k in sides]} | magnitudes
-        found[name] = {key: symmetry_index(*pair) for key, pair in magnitudes.items()}
+        each = [
+            {
+                "range": _range(angles[:, k]),
+                "peak_moment": _mean(_largest, moments[:, k], own),
+                "positive_work": _mean(lambda w, at: work_of(at, w).positive_j, power[:, k], own, time),
+                "negative_work": _mean(lambda w, at: work_of(at, -w).positive_j, power[:, k], own, time),
+            }
+            for k, own in zip(sides, parts, strict=True)
+        ]
+        sizes[name] = {key: (each[0][key], each[1][key]) for key in each[0]}
+    found = {name: {key: symmetry_index(*pair) for key, pair in own.items()} for name, own in sizes.items()}
     feet = _feet(estimate, stances, slice(start, end))
     if not found and feet is None:
         return None
     return {
         "what": WHAT,
         "coordinates": found,
-        "small": _small(estimate, window, list(found)),
+        "small": _small(sizes),
         "feet": feet,
         "stances": None if stances is None else {foot: len(own) for foot, own in stances.items()},
         "reason": _reason(estimate, stances, window),
@@ -92,25 +93,12 @@ NOT_MEANT = 0.02
 """Below this share of the largest of its kind a quantity is too small for a ratio of the sides to say anything."""
 
 
-def _small(estimate: Estimate, window: npt.NDArray[np.bool_], stems: Sequence[str]) -> dict[str, list[str]]:
-    """By stem, the quantities whose larger side is a small part (`NOT_MEANT`) of the largest of all."""
-    names, done = estimate.coordinate_names, work(estimate, window)
-    angles, moments = estimate.known("coordinates")[window], sources.measured_moments(estimate.data)[window]
-
-    def size(key: str, name: str) -> float:
-        k = names.index(name)
-        if key == "range":
-            return float(np.nan_to_num(_range(angles[:, k])))
-        if key == "peak_moment":
-            return float(np.nanmax(np.abs(moments[:, k]), initial=0.0))
-        return abs(done.get(name, {}).get(f"{key.removesuffix('_work')}_j") or 0.0)
-
-    small: dict[str, list[str]] = {stem: [] for stem in stems}
-    for key in ("range", "peak_moment", "positive_work", "negative_work"):
-        sizes = {stem: max(size(key, f"{stem}_r"), size(key, f"{stem}_l")) for stem in stems}
-        for stem, value in sizes.items():
-            if value < NOT_MEANT * max(sizes.values()):
-                small[stem].append(key)
+def _small(sizes: Mapping[str, Mapping[str, tuple[float, float]]]) -> dict[str, list[str]]:
+    """Of the right and left sizes of each quantity by stem those whose larger side is a small part (`NOT_MEANT`) of the
+    largest of all."""
+    larger = {stem: {key: np.nanmax([*pair, 0.0]) for key, pair in own.items()} for stem, own in sizes.items()}
+    most = {key: max(own[key] for own in larger.values()) for own in larger.values() for key in own}
+    small = {stem: [key for key in own if own[key] < NOT_MEANT * most[key]] for stem, own in larger.items()}
     return {stem: keys for stem, keys in small.items() if keys}
 
 
