@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.blas import one_blas_thread
-from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
+from dynakin.errors import DivergenceError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.samples import Sample
 from dynakin.filter.tracker import Tracker
@@ -24,6 +24,7 @@ from dynakin.stream.markers import LiveMarkers
 from dynakin.stream.monitor import Monitor
 from dynakin.stream.plates import LivePlates
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
+from dynakin.stream.sinks.group import SinkGroup
 from dynakin.stream.sources.packets import Source
 from dynakin.stream.sources.reader import Notice, Reader
 from dynakin.stream.start import begin, check_labels, quietest, recording_of, stands, unknown_mass
@@ -74,13 +75,12 @@ class Live:
         record: Callable[[], Sink] | None = None,
         say: Callable[[str], None] = print,
     ) -> None:
-        self.estimator, self.sinks = estimator, list(sinks)
+        self.estimator, self.sinks = estimator, SinkGroup(sinks, record, self.say)
         self.lag_s = live_lag(lag_s, estimator.noise)
         self.delay_s, self.standing_s, self.standing_wait_s = delay_s, standing_s, standing_wait_s
         self.static, self.known = static, known
         self.max_late_s = max_late_s
-        self._say, self._record = say, record
-        self._recording: Sink | None = None
+        self._say = say
         self._reader = Reader(sources, wait_s)
         self._fusion: Fusion | None = None
         self._markers: LiveMarkers | None = None
@@ -97,7 +97,6 @@ class Live:
         self._labels_checked = False
         self._subject: dict[str, float] = {}
         self._stopped = False
-        self.failures: list[str] = []  # of sinks; a session with some is not to be called a success
 
     @property
     def fusion(self) -> Fusion:
@@ -138,6 +137,11 @@ class Live:
         return self._tracker is not None
 
     @property
+    def failures(self) -> list[str]:
+        """Of sinks; a session with some is not to be called a success."""
+        return self.sinks.failures
+
+    @property
     def status(self) -> Status:
         """How it goes, as of the last step."""
         return Status() if self._monitor is None else self._monitor.last
@@ -164,9 +168,7 @@ class Live:
             if self._monitor is not None and (text := self._monitor.summary(self.fusion)):
                 self.say(text)
             self._reader.close()
-            for sink in self.sinks:
-                sink.close()
-            self._drop_failed()
+            self.sinks.close()
 
     def stop(self) -> None:
         """End `run` soon; from any thread."""
@@ -205,12 +207,8 @@ class Live:
             self._subject["mass_kg"] = _MASS_KG
             text = f"the mass is not given and there are no plates; {_MASS_KG:g} kg are taken, so that moments are"
             self.say(warning("mass", f"{text} right in shape only."))
-        for sink in self.sinks:
-            self._begin(sink)
-
-    def _begin(self, sink: Sink) -> None:
-        sink.begins(self._subject, self.delay_s)
-        sink.opened(self.fusion.markers, self.fusion.plates)
+        self.sinks.begins(self._subject, self.delay_s)
+        self.sinks.opened(self.fusion.markers, self.fusion.plates)
 
     def _turn(self) -> None:
         packet = self._reader.get(_POLL_S)
@@ -221,54 +219,17 @@ class Live:
             if packet.fatal is not None:
                 raise packet.fatal
         elif packet is not None:
-            for sink in self.sinks:
-                sink.packet(packet)
+            self.sinks.packet(packet)
             self.fusion.push(packet)
         self._take(now)
         if now - self._asked > _ASK_S:
             self._asked = now
-            self._wishes()
+            for wish in self.sinks.asked():
+                if wish in ("restart", "recalibrate", "stop"):
+                    getattr(self, wish)()
             if self._monitor is not None and self._running and not self._reader.over:
                 for text in self._monitor.changes(self.fusion, now):
                     self.say(text)
-
-    def _drop_failed(self) -> None:
-        for sink in [sink for sink in self.sinks if sink.failure() is not None]:
-            text = sink.failure()
-            assert text is not None
-            self.sinks.remove(sink)
-            if sink is self._recording:
-                self._recording = None
-            sink.close()
-            self.failures.append(text)
-            self.say(text)
-
-    def _wishes(self) -> None:
-        self._drop_failed()
-        for wish in [wish for sink in self.sinks for wish in sink.asked()]:
-            if wish in ("restart", "recalibrate", "stop"):
-                getattr(self, wish)()
-            elif wish == "record" and self._record is not None:
-                self._switch_recorder(self._record)
-
-    def _switch_recorder(self, record: Callable[[], Sink]) -> None:
-        """Begin to record, or end it."""
-        if self._recording is not None:
-            self._recording.close()
-            self._drop_failed()
-            if self._recording is not None:
-                self.sinks.remove(self._recording)
-                self._recording = None
-                self.say("The recording has ended.")
-            return
-        try:
-            self._recording = record()
-        except DynakinError as error:
-            self.say(error.message)
-            return
-        self._begin(self._recording)
-        self.sinks.append(self._recording)
-        self.say("Recording.")
 
     def _take(self, now_s: float) -> None:
         for came in self.fusion.poll(now_s):
@@ -369,8 +330,7 @@ class Live:
         self._ready_s = time.monotonic()
         self._window.clear()
         started = Started(initial, self.tracker.core_model, self.fusion.markers.rate_hz)
-        for sink in self.sinks:
-            sink.started(started)
+        self.sinks.started(started)
         self.say(text)
 
     def _step(self, fused: Fused) -> None:
@@ -404,8 +364,7 @@ class Live:
         status = monitor.status(self.fusion, fused, whole, estimate, smoothed, state, tracker.verdicts)
         published = smoothed if tracker.lag else estimate
         frame = LiveFrame(estimate, smoothed, published, fused, state, deviations, status)
-        for sink in self.sinks:
-            sink.frame(frame)
+        self.sinks.frame(frame)
         monitor.published(sample.time_s, time.monotonic() - fused.arrived_s)
         news = self._feet.news() if self._feet is not None else []
         motion = monitor.motion(estimate, fused)
@@ -418,5 +377,4 @@ class Live:
         phase = "running" if self._running else "waiting" if self._standing_since is None else "standing"
         status = Status(phase=phase) if self._monitor is None or not self._running else self._monitor.last
         self._say(text)
-        for sink in self.sinks:
-            sink.said(text, status)
+        self.sinks.said(text, status)
