@@ -22,7 +22,7 @@ from dynakin.model.markers.anatomy import anatomy, expanded, standing_at
 from dynakin.model.markers.draft.by_name import places, said
 from dynakin.model.markers.draft.draft import drafted, guess_markers
 from dynakin.model.markers.draft.guess import Guess, toml_text
-from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.markers.marker_set import load_marker_set, set_of
 from dynakin.model.markers.match import match_markers
 from dynakin.model.markers.recognise import recognise
 from dynakin.recordings.read import read
@@ -95,6 +95,13 @@ def test_letters_that_count_a_cluster_are_no_side() -> None:
         assert found is not None and (found.segment, found.side) == (name.split("_")[0], None)
     french = said("cuisse_G")
     assert french is not None and (french.segment, french.side) == ("thigh", "left")
+
+
+def test_numbered_markers_on_the_sacrum_are_a_cluster_of_the_pelvis() -> None:
+    """None of them is its middle; and the middle of the body has no side that a name could lack."""
+    for name in ("SACR1", "SAC3", "sacrum_2", "Sacral.3"):
+        found = said(name)
+        assert found is not None and (found.place, found.segment, found.side) == (None, "pelvis", "centre"), name
 
 
 def test_sides_as_first_words_are_no_persons() -> None:
@@ -289,7 +296,7 @@ def test_names_that_files_cannot_hold() -> None:
     guesses = guess_markers(odd)
     assert "half \ud800" not in [guess.recorded for guess in guesses]
     found = drafted(odd)
-    assert found is not None and found.marker("KNE").right == ("rechts\x7f Knie lateral",)
+    assert found is not None and set_of(found).marker("KNE").right == ("rechts\x7f Knie lateral",)
     assert expanded(tomllib.loads(toml_text(guesses, "odd", "a.trc")))["markers"]
 
 

@@ -143,6 +143,43 @@ def test_a_static_recording_of_another_person_is_doubted() -> None:
         assert len(said) == doubted and all(text.startswith("Warning: distances between markers") for text in said)
 
 
+def test_labels_that_are_exchanged_in_the_standing_trial_are_named() -> None:
+    own = standing()
+    names = [{"RKNE": "RTHI", "RTHI": "RKNE"}.get(name, name) for name in own.marker_names]
+    said = [str(m) for m in definition().calibrate(own, static=replace(own, marker_names=tuple(names))).messages]
+    assert any("standing trial standing: " in text and "look swapped" in text for text in said)
+
+
+def test_names_of_the_standing_trial_that_nobody_knows_are_said_where_they_would_help() -> None:
+    own = standing()
+    ends = {"KNE": "Q1", "ANK": "Q2"}
+    names = tuple(name[0] + ends[name[1:]] if name[1:] in ends else name for name in own.marker_names)
+    trial, static = unseen(own, "RKNE", "LKNE", "RANK", "LANK"), replace(own, marker_names=names)
+    (said,) = (str(m) for m in definition().calibrate(trial, static=static).messages if m.topic == "joints")
+    assert "does not know" in said and all(name in said for name in ("RQ1", "LQ1", "RQ2", "LQ2"))
+    assert "dynakin markers new standing" in said and "Give a standing trial" not in said
+
+
+def test_a_pelvis_that_two_markers_show_is_said_to_turn_unseen() -> None:
+    for gone, seen_by in ((("LPSI", "RPSI"), "RASI and LASI"), (("LPSI",), "")):
+        said = [m.text for m in definition().calibrate(unseen(standing(), *gone)).messages if m.topic == "angles"]
+        assert len(said) == bool(seen_by) and all(f"seen by {seen_by} alone" in text for text in said)
+
+
+def test_a_pelvis_whose_spines_only_the_standing_trial_has_is_known() -> None:
+    """In motion the crests and a plate on the sacrum show it."""
+    whole = standing()
+    more = {"RILC": (0.0, 1.07, 0.13), "LILC": (0.0, 1.07, -0.13)}
+    more |= {"SAC1": (-0.12, 1.03, 0.02), "SAC2": (-0.12, 1.03, -0.02), "SAC3": (-0.12, 0.98, 0.0)}
+    markers = np.concatenate(
+        [whole.markers, np.repeat(np.array([list(more.values())]), len(whole.time), axis=0)], axis=1
+    )
+    static = replace(whole, marker_names=(*whole.marker_names, *more), markers=markers)
+    found = load_model("fullbody", WHO).calibrate(unseen(static, "LASI", "RASI", "LPSI", "RPSI"), static=static)
+    assert {"SAC1", "SAC2", "SAC3"} <= set(found.recorded_markers) and found.plan is not None
+    assert found.plan.start["pelvis_tilt"] == pytest.approx(measured().plan.start["pelvis_tilt"], abs=0.01)  # type: ignore[union-attr]
+
+
 def test_a_marker_of_a_foot_that_only_the_standing_trial_has_is_named() -> None:
     own = standing()
     heel = next(name for name in own.marker_names if name.startswith("R") and "HEE" in name)

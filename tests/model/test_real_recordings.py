@@ -109,7 +109,7 @@ def test_a_missing_back_of_the_pelvis_is_said_for_all_that_needs_it(data_dir: Pa
         load_model("fullbody").calibrate(less)
     swap = {"RKNE": "ROTT", "LKNE": "LOTT"}
     other = replace(trial, marker_names=tuple(swap.get(name, name) for name in trial.marker_names))
-    with pytest.raises(ModelError, match=r"does not know ROTT, LOTT: if they mark these joints, say so in a set"):
+    with pytest.raises(ModelError, match=r"does not know ROTT, LOTT: if they mark what lacks, say so in a set"):
         load_model("fullbody").calibrate(other)
 
 

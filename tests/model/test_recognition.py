@@ -18,7 +18,7 @@ from dynakin.model.definition import load_model
 from dynakin.model.markers.fit import choose_marker_set
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import MarkerMatch, match_markers
-from dynakin.model.markers.recognise import Recognised, _without_swap, recognise
+from dynakin.model.markers.recognise import Recognised, _without_swap, recognise, recognise_standing
 from dynakin.model.markers.swaps import Swap
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import FacingPairs
@@ -183,6 +183,69 @@ def test_a_misplaced_marker_stays_left_out_where_names_add_others() -> None:
     assert "used by what their names say" in found.messages[0].text
     assert any("RASIS is left out: check its label" in text for text in warnings_of(found.messages))
     assert found.wrong_n == 1
+
+
+def added(recording: Recording, beside: str, at: dict[str, tuple[float, float, float]]) -> Recording:
+    """With further markers, or others in place of its own, so far (m, laboratory) from one of its markers."""
+    here = recording.marker(beside)
+    places = {name: recording.marker(name) for name in recording.marker_names}
+    places |= {name: here + np.array(offset) for name, offset in at.items()}
+    return replace(recording, marker_names=tuple(places), markers=np.stack(list(places.values()), axis=1))
+
+
+def test_a_plate_of_markers_on_the_sacrum_is_of_the_pelvis() -> None:
+    whole = walking("helen-hayes")
+    plate = added(whole, "SACR", {"SACR1": (0.0, 0.02, 0.02), "SACR2": (0.0, 0.02, -0.02), "SACR3": (0.0, -0.03, 0.0)})
+    gone = plate.marker_names.index("SACR")
+    names = tuple(name for name in plate.marker_names if name != "SACR")
+    found = recognise(replace(plate, marker_names=names, markers=np.delete(plate.markers, gone, axis=1)))
+    pelvis = {
+        name for (key, _), name in found.match.names.items() if found.match.marker_set.marker(key).segment == "pelvis"
+    }
+    assert pelvis == {"RASI", "LASI", "SACR1", "SACR2", "SACR3"} and not warnings_of(found.messages)
+
+
+@pytest.mark.parametrize("ahead_m", [0.0, 0.045])
+def test_a_cluster_may_be_anywhere_on_its_segment(ahead_m: float) -> None:
+    """On the heel, where the midfoot is not, and nearer to where another marker is expected than this one itself."""
+    moved = walking("oxford-foot")
+    for side in "RL":
+        moved = added(moved, f"{side}HEE", {f"{side}CPG": (-0.03, 0.0, 0.0), f"{side}PCA": (0.004, 0.025, 0.0)})
+        moved = added(moved, f"{side}STL", {f"{side}STL": (ahead_m, 0.0, 0.0)})
+    assert not warnings_of(recognise(moved).messages)
+
+
+def test_a_place_that_is_exchanged_with_a_cluster_is_named() -> None:
+    recording = walking("oxford-foot")
+    for one, other in (("RHEE", "RCPG"), ("RKNE", "RSHN")):
+        (said,) = warnings_of(recognise(exchanged(recording, one, other)).messages)
+        assert one in said and said.count("left out") == 1
+
+
+def test_names_that_only_the_standing_trial_has_are_known_by_what_they_say() -> None:
+    """Unless a set was asked for: who has one says what its names are."""
+    whole = walking("gait2354")
+    ends = {"Knee.Lat": "LatEpi", "Knee.Med": "MedEpi", "Ankle.Lat": "LatMal", "Ankle.Med": "MedMal"}
+    own = {f"{side}.{end}": f"{side}{odd}" for side in "RL" for end, odd in ends.items()}
+    assert own.keys() <= set(whole.marker_names)
+    static = renamed(whole, lambda name: own.get(name, name))
+    moving = [k for k, name in enumerate(whole.marker_names) if name not in own]
+    trial = replace(whole, marker_names=tuple(whole.marker_names[k] for k in moving), markers=whole.markers[:, moving])
+    chosen = recognise(trial)
+    found = recognise_standing(static, trial, chosen)
+    known = {
+        static.marker_names[whole.marker_names.index(name)]: key
+        for key, name in recognised("gait2354").match.names.items()
+    }
+    assert {name: key for key, name in found.match.names.items() if name in own.values()} == {
+        name: known[name] for name in own.values()
+    }
+    assert chosen.match.names.items() <= found.match.names.items()
+    (said,) = warnings_of(found.messages)
+    assert "8 of" in said and "RLatEpi (KNE)" in said
+    asked = recognise(trial, load_marker_set("gait2354"))
+    unknown = recognise_standing(static, trial, asked).match.unexplained
+    assert set(own.values()) <= set(unknown)
 
 
 def test_names_of_joint_centres_beside_a_marked_pelvis_are_on_the_skin() -> None:

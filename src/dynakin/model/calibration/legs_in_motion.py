@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
-from dynakin.messages import Message, note
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.completion import Completed, Proportions, laid
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.functional import (
@@ -32,6 +32,7 @@ from dynakin.model.calibration.joint_motion import Centre, JointMotion, joint_ax
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.sites import Candidate
 from dynakin.model.markers.fit import LEG
+from dynakin.model.markers.match import MarkerMatch
 from dynakin.model.markers.recognise import CORRECT
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import listed, words
@@ -248,13 +249,37 @@ def no_legs(
         text = f"{match.where}: {short}, and nobody stands still in it; expected it, or {expected}."
     else:
         text = " ".join([f"{match.where}: {said}; expected {expected}.", *legs.failed])
-    if unknown := match.unexplained:
-        more = f" and {len(unknown) - _LISTED} more" if len(unknown) > _LISTED else ""
-        text += (
-            f" Marker set {match.marker_set.name} does not know {', '.join(unknown[:_LISTED])}{more}: if they mark "
-            "these joints, say so in a set of your own (dynakin markers new TRIAL -o my.toml)."
-        )
+    text += not_understood(match, "TRIAL")
     return ModelError(text, asks_for="static")
+
+
+def not_understood(match: MarkerMatch, file: str) -> str:
+    """A sentence on names that a marker set does not know, which may show what nothing else does; "" without any."""
+    unknown = match.unexplained
+    if not unknown:
+        return ""
+    more = f" and {len(unknown) - _LISTED} more" if len(unknown) > _LISTED else ""
+    return (
+        f" Marker set {match.marker_set.name} does not know {', '.join(unknown[:_LISTED])}{more}: if they mark "
+        f"what lacks, say so in a set of your own (dynakin markers new {file} -o my.toml)."
+    )
+
+
+def unmarked_legs(unmarked: Sequence[str], source: Trial, static: Recording | None) -> Message:
+    """Of knees and ankles that are where the movement or proportions have them, and what would show them."""
+    joints = listed([words(name) for name in sorted(unmarked)])
+    text = (
+        f"no marker shows {joints}: they are where the movement, or else the proportions of an adult who stands, has "
+        "them, to one or two centimetres. The zeros of the legs' angles may be 10 deg off, and moments at knee and "
+        "ankle are two to five times less sure; the deviations say so."
+    )
+    if static is None:
+        return warning("joints", f"{text} Give a standing trial with markers on knees and ankles (--static).")
+    unknown = not_understood(source.match, str(static.path or static.name))
+    instead = (
+        f" The standing trial {static.name} has none that is used there; give one with markers on knees and ankles."
+    )
+    return warning("joints", text + (unknown or instead))
 
 
 def _one_short(supposed: Sequence[str], finder: LandmarkFinder) -> str:

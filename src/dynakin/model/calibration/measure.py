@@ -28,24 +28,30 @@ from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmark_markers import in_both, needed_markers, seen_together, table_markers
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
-from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, Legs, legs_in_motion, no_legs, supposed_legs
+from dynakin.model.calibration.legs_in_motion import (
+    LEG_JOINTS,
+    Legs,
+    legs_in_motion,
+    no_legs,
+    not_understood,
+    supposed_legs,
+    unmarked_legs,
+)
 from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.markers.fit import refuse_unfit
-from dynakin.model.markers.match import MarkerKey, MarkerMatch, without_prefix
-from dynakin.model.markers.recognise import recognise
+from dynakin.model.markers.match import MarkerKey, MarkerMatch
+from dynakin.model.markers.recognise import recognise, recognise_standing
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
 from dynakin.recordings.companions import another_person
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
-from dynakin.recordings.landmarks import plain_name
 from dynakin.recordings.orientation import against_vertical, axis_vector, walks
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import MIN_STILL_S, standing_window
-from dynakin.results.naming import listed, words
 from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
@@ -240,22 +246,14 @@ def _matched(asked: Asked, messages: list[Message]) -> _Trials:
         messages.append(note("calibration", how))
     if static is None:
         return _Trials(as_asked, trial, trial, side)
-    stands = recognise(static, recognised.match.marker_set)
-    if _own_names(recording).isdisjoint(_own_names(static)):
-        raise ModelError(
-            f"{static.path or static.name}: none of its {len(static.seen_names)} markers is in {recording.name}; "
-            "expected a standing trial (--static) of the same person with the same markers"
-        )
+    stands = recognise_standing(static, recording, recognised)
+    messages += stands.messages
     source = Trial.of(static, stands.match, asked.find_ground(static, stands.match))
     source = source.facing() if model.floating else source
     messages += lost_on_feet(trial, source) if model.sided else []
     if other := another_person(recording, static):
         messages.append(warning("calibration", f"{other}. Lengths and marker places are those of {static.name}."))
     return _Trials(as_asked, trial, source, side)
-
-
-def _own_names(recording: Recording) -> set[str]:
-    return set(map(plain_name, without_prefix(tuple(recording.seen_names)).values()))
 
 
 def _marked(asked: Asked, trials: _Trials, messages: list[Message]) -> _Marked:
@@ -320,7 +318,8 @@ def _landmarks(
         found = completed(model, asked.table, marked.locks, legs.landmarks, standing, height_m, still.trial.match.where)
     except ModelError as error:
         reasons = dict.fromkeys(source.match.left_out.values())
-        raise error.reworded("; ".join([error.message, *reasons])) from None
+        unknown = not_understood(source.match, str(source.recording.path or "TRIAL"))
+        raise error.reworded("; ".join([error.message, *reasons]) + ("." + unknown if unknown else "")) from None
     if still.stands:
         messages += check_standing(found.landmarks, source.recording.name)
     supposed = supposed_legs(found, legs, marked.chosen)
@@ -328,17 +327,7 @@ def _landmarks(
         raise no_legs(supposed, source, asked.static, legs, finder)
     unmarked = tuple(name for name in LEG_JOINTS if name in (*legs.joints, *supposed))
     if unmarked:
-        joints = listed([words(name) for name in sorted(unmarked)])
-        messages.append(
-            warning(
-                "joints",
-                f"no marker shows {joints}: they are where the movement, or else the proportions of an adult who "
-                "stands, "
-                "has them, to one or two centimetres. The zeros of the legs' angles may be 10 deg off, and moments at "
-                "knee and ankle are two to five times less sure; the deviations say so. Give a standing trial with "
-                "markers on knees and ankles (--static).",
-            )
-        )
+        messages.append(unmarked_legs(unmarked, source, asked.static))
     return found, unmarked
 
 

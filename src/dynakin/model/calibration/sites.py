@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.errors import ModelError
-from dynakin.messages import Message, note
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.frames import FIRST_FRAMES, Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.posture import Posture, find_posture, frame_landmarks
@@ -100,6 +100,14 @@ def find_locks(
             messages.append(
                 note("calibration", f"Segment {name} has one marker only ({one}): its angle leans on its neighbours.")
             )
+        if count == 2 and model.sided and segment.parent == "ground":
+            one, other = (c.recorded for c in chosen if c.segment == name)
+            text = (
+                f"the {name} is seen by {one} and {other} alone, and turns unseen about the line between them: its "
+                "tilt and the hips' flexion follow from the legs, which may have them 10 deg off, more than their "
+                "deviations say. A third marker would show them, on the back of the pelvis."
+            )
+            messages.append(warning("angles", text))
         if count or all(locks.get(axis.coordinate) is not None for axis in segment.axes):
             continue
         rule = segment.without_markers

@@ -65,6 +65,7 @@ class Expected:
         mirror: (n,) the marker of the other side, of a middle marker itself.
         even: (n, n) distances that are the same on both sides.
         rigid: markers of one segment, whether or not their places are known.
+        placed: (n,) whether a marker's name says its place; one of a cluster may be anywhere on its segment.
     """
 
     distance: Array
@@ -75,6 +76,7 @@ class Expected:
     mirror: npt.NDArray[np.intp]
     even: npt.NDArray[np.bool_]
     rigid: npt.NDArray[np.bool_]
+    placed: npt.NDArray[np.bool_]
 
     @classmethod
     def of(cls, match: MarkerMatch, keys: Sequence[MarkerKey]) -> Expected:
@@ -108,9 +110,10 @@ class Expected:
         up[np.abs(up) < _ABOVE] = np.nan
         other = {"right": "left", "left": "right", "centre": "centre"}
         mirror = np.array([spot.get((name, other[side]), k) for k, (name, side) in enumerate(keys)], dtype=int)
-        paired = np.array([name in known and (name, other[side]) in spot for name, side in keys], dtype=bool)
+        placed = np.array([name in known for name, _ in keys], dtype=bool)
+        paired = placed & np.array([(name, other[side]) in spot for name, side in keys], dtype=bool)
         even = rigid & paired[:, None] & paired[None]
-        return cls(distance, sd, right, forward, up, mirror, even, rigid)
+        return cls(distance, sd, right, forward, up, mirror, even, rigid, placed)
 
 
 def _put(table: Array, along: Array, a: int | None, b: int | None) -> None:
@@ -207,6 +210,12 @@ class Deviations:
     spread: Array
     right: Array
     forward: Array
+
+    @property
+    def largest(self) -> Array:
+        """(n,) of each marker, of all kinds and to all others."""
+        parts = (self.distance, self.uneven, self.spread, self.right, self.forward)
+        return np.asarray(np.max(np.abs(parts), axis=(0, 2), initial=0.0))
 
     @property
     def total(self) -> Array:

@@ -10,7 +10,7 @@ from typing import Any
 
 from dynakin.errors import ModelError
 from dynakin.files import is_file
-from dynakin.model.markers.anatomy import enlarged, expanded
+from dynakin.model.markers.anatomy import expanded
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.settings.strict import nearest, read_toml, validate
 
@@ -39,10 +39,14 @@ def load_marker_set(name_or_path: str | Path) -> MarkerSetFile:
     return _built_in(path) if name in known else _read(path)
 
 
-def enlarged_marker_set(name: str, more: Mapping[str, Any]) -> MarkerSetFile:
-    """A built-in set that also knows further names (`anatomy.enlarged`)."""
-    path = Path(str(_FOLDER / f"{name}.toml"))
-    return validate(MarkerSetFile, expanded(enlarged(read_toml(path), more)), str(path))
+def contents_of(name: str) -> dict[str, Any]:
+    """What the file of a built-in set says, before places are written out."""
+    return read_toml(Path(str(_FOLDER / f"{name}.toml")))
+
+
+def set_of(contents: Mapping[str, Any]) -> MarkerSetFile:
+    """The marker set that a file of these contents would give."""
+    return validate(MarkerSetFile, expanded(contents), str(contents["name"]))
 
 
 @cache

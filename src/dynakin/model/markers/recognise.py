@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from dynakin.errors import ModelError, RecordingError
 from dynakin.messages import Message, note, warning
-from dynakin.model.markers.anatomy import anatomy
+from dynakin.model.markers.anatomy import anatomy, enlarged
 from dynakin.model.markers.draft.draft import drafted, further
 from dynakin.model.markers.draft.guess import Guess, names_of
 from dynakin.model.markers.fit import LEG, LISTED, ROOT, choice_words, fits, lacking, usable_of
@@ -21,14 +22,16 @@ from dynakin.model.markers.geometry import (
     frames_of,
     places_of,
 )
-from dynakin.model.markers.marker_set import enlarged_marker_set
+from dynakin.model.markers.marker_set import contents_of, set_of
 from dynakin.model.markers.match import (
     MarkerKey,
     MarkerMatch,
     match_markers,
+    without_prefix,
 )
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.markers.swaps import Swap, distance_words, find_swaps
+from dynakin.recordings.landmarks import plain_name
 from dynakin.recordings.recording import Recording
 from dynakin.units import PERSON_HEIGHT_M
 
@@ -48,11 +51,13 @@ class Recognised:
         match: without the markers that are not where their names say.
         messages: the choice, and a warning for each of these.
         wrong_n: markers whose places contradict a body, apart from exchanged ones.
+        contents: what the file of the set would say, as far as the names decided on it; None where it was asked for.
     """
 
     match: MarkerMatch
     messages: tuple[Message, ...]
     wrong_n: int = 0
+    contents: Mapping[str, Any] | None = None
 
 
 def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recognised:
@@ -88,17 +93,37 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
             best = own
     assert best is not None
     _refuse_wrong_set(best, where)
-    best, more = _enlarged(recording, best)
+    best, more = _enlarged(recording, replace(best, contents=contents_of(best.match.marker_set.name)))
     choice = choice_words(best.match, ranked)
     if more:
         choice = f"{choice.removesuffix('.')}; used by what their names say: {_places(more)}."
-    doubtful = [guess for guess in more if guess.place and guess.sure != "sure" and _on_leg_or_pelvis(guess)]
-    messages = [note("marker set", choice), *best.messages]
-    if doubtful:
-        messages.insert(1, _guessed_words(recording, len(doubtful), f" ({_places(doubtful)})"))
-    messages += half_marked_words(best.match)
+    doubtful, said = _doubtful(recording, more)
+    messages = [note("marker set", choice), *said, *best.messages, *half_marked_words(best.match)]
     match = replace(best.match, guessed=tuple(guess.recorded for guess in doubtful))
-    return Recognised(match, tuple(messages), best.wrong_n)
+    return replace(best, match=match, messages=tuple(messages))
+
+
+def recognise_standing(static: Recording, recording: Recording, known: Recognised) -> Recognised:
+    """The markers of a standing trial by the set that a recording of the same person is known to have; where that was
+    not asked for, also those by what their names say which the person wears while standing only.
+
+    Raises:
+        ModelError: as `recognise`; no name is in both.
+    """
+    found = recognise(static, known.match.marker_set)
+    where = found.match.where
+    if _own_names(recording).isdisjoint(_own_names(static)):
+        raise ModelError(
+            f"{where}: none of its {len(static.seen_names)} markers is in {recording.name}; expected a standing trial "
+            "(--static) of the same person with the same markers"
+        )
+    found, more = _enlarged(static, replace(found, contents=known.contents))
+    found = replace(found, messages=(*_doubtful(static, more)[1], *found.messages))
+    return replace(found, messages=tuple(message.of(f"standing trial {static.name}") for message in found.messages))
+
+
+def _own_names(recording: Recording) -> set[str]:
+    return set(map(plain_name, without_prefix(tuple(recording.seen_names)).values()))
 
 
 def half_marked_words(match: MarkerMatch) -> list[Message]:
@@ -118,9 +143,9 @@ def _enlarged(recording: Recording, found: Recognised) -> tuple[Recognised, list
     """With markers whose names the set does not know but say a place that it leaves free, and these; without those that
     the body contradicts, and without any that have a marker of the set left out. What is left out stays so."""
     more = further(recording, found.match)
-    while more:
-        set_ = enlarged_marker_set(found.match.marker_set.name, names_of(more))
-        match = match_markers(set_, recording.marker_names, recording.seen, found.match.where)
+    while more and found.contents is not None:
+        contents = enlarged(found.contents, names_of(more))
+        match = match_markers(set_of(contents), recording.marker_names, recording.seen, found.match.where)
         names = {key: name for key, name in match.names.items() if key not in found.match.left_out}
         match = replace(match, names=names | found.match.names, left_out=found.match.left_out)
         try:
@@ -132,7 +157,7 @@ def _enlarged(recording: Recording, found: Recognised) -> tuple[Recognised, list
         kept = [guess for guess in more if guess.recorded not in gone]
         if len(kept) == len(more):
             if found.match.names.items() <= own.match.names.items():
-                return replace(own, wrong_n=own.wrong_n + found.wrong_n), more
+                return replace(own, wrong_n=own.wrong_n + found.wrong_n, contents=contents), more
             break
         more = kept
     return found, []
@@ -146,6 +171,12 @@ def _places(guesses: Sequence[Guess]) -> str:
 
 def _on_leg_or_pelvis(guess: Guess) -> bool:
     return anatomy()["places"][guess.place].get("segment") in (ROOT, *LEG)
+
+
+def _doubtful(recording: Recording, more: Sequence[Guess]) -> tuple[list[Guess], list[Message]]:
+    """Guesses at places of pelvis and legs that only likely say so, and a warning of them."""
+    found = [guess for guess in more if guess.place and guess.sure != "sure" and _on_leg_or_pelvis(guess)]
+    return found, [_guessed_words(recording, len(found), f" ({_places(found)})")] if found else []
 
 
 def _guessed_words(recording: Recording, n: int, which: str = "") -> Message:
@@ -167,17 +198,18 @@ def _guessed(recording: Recording, unknown: ModelError) -> Recognised:
     """
     where = str(recording.path or recording.name)
     try:
-        guessed = drafted(recording)
+        contents = drafted(recording)
     except RecordingError as error:
         why = error.message.removeprefix(f"{where}: ")
         raise unknown.reworded(f"{unknown.message}; nor can places be guessed: {why}") from None
-    if guessed is None:
+    if contents is None:
         raise unknown
+    guessed = set_of(contents)
     found = checked(recording, match_markers(guessed, recording.marker_names, recording.seen, where))
     if found.wrong_n or lacking(guessed, found.match.names):
         raise unknown
     match = replace(found.match, guessed=tuple(found.match.names.values()))
-    return Recognised(match, (_guessed_words(recording, len(match.names)), *found.messages))
+    return Recognised(match, (_guessed_words(recording, len(match.names)), *found.messages), contents=contents)
 
 
 def checked(recording: Recording, match: MarkerMatch) -> Recognised:

@@ -30,7 +30,11 @@ _KINDS = (
         ("held",),
         "Use the set that names the markers of thighs and shanks (dynakin markers new), or record some there.",
     ),
-    _Kind("Joint centres", ("joints",), "Give a standing trial with markers on knees and ankles (--static)."),
+    _Kind(
+        "Joint centres",
+        ("joints",),
+        "Give a standing trial with markers on knees and ankles (--static), under names that the marker set knows.",
+    ),
     _Kind(
         "Mass",
         ("weight",),
@@ -113,7 +117,12 @@ _KINDS = (
         "(--contact).",
     ),
     _Kind("Model's ranges", ("range",), "Widen them in the file, or give --forward, before OpenSim takes the angles."),
-    _Kind("Pelvis angles", ("angles",), "Give --forward, or take the pelvis' and the hips' angles elsewhere only."),
+    _Kind(
+        "Pelvis angles",
+        ("angles",),
+        "Give what is asked for (--forward, or more markers on the pelvis), or take the pelvis' and the hips' angles "
+        "elsewhere only.",
+    ),
 )
 _OTHER = _Kind(
     "Recording",

@@ -28,7 +28,7 @@ _SEGMENTS = {
     "shank": ("unterschenkel", "lowerleg", "shank", "tibia", "jambe", "gamba", "calf", "shin", "lleg", "leg", "tib",
               "sha", "shk", "sk", "sh"),
     "foot": ("midfoot", "foot", "fuss", "pied"),
-    "pelvis": ("pelvis", "becken", "bassin", "pelv", "pel"),
+    "pelvis": ("pelvis", "becken", "bassin", "pelv", "pel", "sacrum", "sacral", "sacr", "sac"),
     "upper_arm": ("upperarm", "oberarm", "humerus", "deltoid", "triceps", "biceps", "bicep", "uparm", "uarm",
                   "upa", "arm"),
     "forearm": ("handgelenk", "poignet", "wrist", "lowerarm", "unterarm", "forearm", "farm", "larm", "frm", "fra"),
@@ -36,6 +36,8 @@ _SEGMENTS = {
     "thorax": ("thorax", "trunk", "torso", "chest", "rib", "trnk"),
     "head": ("head", "kopf", "tete"),
 }  # fmt: skip
+_MIDDLE = ("pelvis", "thorax", "head")
+"""Segments that the body has once: a name without a side lacks none."""
 _CENTRES = {
     "hip": "HJC",
     "knee": "KJC",
@@ -104,7 +106,8 @@ def said(name: str) -> Said | None:
             return Said(place, None, "centre" if centre else own_side, "likely", f"its name: {rest}")
         segment = _segment(rest)
         if segment is not None:
-            return Said(None, segment, own_side, "likely", f"its name: {rest}")
+            where = own_side or ("centre" if segment in _MIDDLE else None)
+            return Said(None, segment, where, "likely", f"its name: {rest}")
     return None
 
 

@@ -10,12 +10,13 @@ import re
 from collections import Counter, defaultdict
 from collections.abc import Container, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
-from dynakin.model.markers.anatomy import anatomy, expanded
+from dynakin.model.markers.anatomy import anatomy
 from dynakin.model.markers.draft.by_geometry import (
     Stature,
     alike_on_both_sides,
@@ -27,7 +28,6 @@ from dynakin.model.markers.draft.by_geometry import (
 from dynakin.model.markers.draft.by_name import Sure, places, said_together
 from dynakin.model.markers.draft.guess import Guess, contents, is_text, names_in_set, printable, rest_of
 from dynakin.model.markers.match import MarkerMatch, is_unlabelled
-from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.recordings.frame import UPRIGHT
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, plain_name
 from dynakin.recordings.orientation import find_forward, find_vertical
@@ -88,8 +88,8 @@ def guess_markers(recording: Recording) -> list[Guess]:
     return _without_rivals(_as_on_the_other_side(_one_each(guesses), spoken), names, person, spoken)
 
 
-def drafted(recording: Recording) -> MarkerSetFile | None:
-    """The marker set of what is at least likely among the guesses; None where nothing is.
+def drafted(recording: Recording) -> dict[str, Any] | None:
+    """What the file of a marker set says that holds what is at least likely among the guesses; None where nothing is.
 
     Raises:
         RecordingError: as `guess_markers`.
@@ -98,13 +98,12 @@ def drafted(recording: Recording) -> MarkerSetFile | None:
     if not any(guess.place for guess in guesses):
         return None
     places_, clusters = contents(guesses)
-    whole = {
+    return {
         "schema_version": 1,
         "name": GUESSED,
         "places": {place: names_in_set(own) for place, own in places_.items()},
         "clusters": {segment: [entry for entry, _ in own] for segment, own in clusters.items()},
     }
-    return MarkerSetFile.model_validate(expanded(whole))
 
 
 def further(recording: Recording, match: MarkerMatch) -> list[Guess]:
