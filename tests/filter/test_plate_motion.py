@@ -263,6 +263,30 @@ def test_what_is_carried_in_the_hands_is_said(mass_kg: float) -> None:
         assert abs(int(found) - mass_kg) < 3.0
 
 
+@pytest.mark.parametrize(
+    ("kg", "first_s", "end_s", "told"),
+    [
+        (4.0, 3.0, 8.0, True),
+        (4.0, 0.0, 4.0, True),  # put down
+        (4.0, 2.0, 6.0, True),
+        (1.0, 3.0, 8.0, False),
+        (4.0, 3.0, 3.2, False),  # no longer than a pull
+        (-4.0, 3.0, 8.0, False),  # a hand that leans on something
+    ],
+)
+def test_a_load_that_one_hand_takes_up_is_carried(kg: float, first_s: float, end_s: float, told: bool) -> None:
+    """The plate of that side gives more, and stays so: "plate 1 shows 10.30 times what plate 2 does", and the shoulder
+    was 11 N m off, said to 1.3."""
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    up = np.abs(squat.plates[0].force).mean(axis=0).argmax()
+    more = np.zeros((squat.n_frames, 3))
+    more[:, up] = kg * GRAVITY_M_S2 * np.interp(squat.time, [first_s - 0.2, first_s, end_s, end_s + 0.2], [0, 1, 1, 0])
+    ready = person().prepare(with_forces(squat, lambda force: force + more, 0))
+    said = [message.text for message in about(ready.messages, "carried")]
+    assert len(said) == told and not about(ready.messages, "gain")
+    assert not told or "about 4 kg were carried in the hands" in said[0]
+
+
 def test_moments_that_bear_what_is_carried_are_absent() -> None:
     """Elbows were 7 N m off and said to 1."""
     squat = simulate("fullbody", "squat", 7, 8.0).recording
