@@ -95,7 +95,8 @@ def judged_by_motion(
         )
     bears = bearing(found, may, names, by_plate, claimed, recording.rate)
     if bears.any():
-        reasons.append(note("plates", _declared_in_words(found, bears, names, recording.time)))
+        if (derived := bears & ~undeclared[:, None]).any():
+            reasons.append(note("plates", _declared_in_words(found, derived, names, recording.time)))
         found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
     undeclared |= found.undeclared | _nearly_all(found)
     if found.too_much is not None and loads is not None:  # where the other foot is off the plates, too
