@@ -674,6 +674,6 @@ def test_a_load_in_the_hands_counts_in_the_moments_that_bear_it() -> None:
     with_it = subject.with_ground(0.0, 3.0)
     assert with_it.sizes == replace(subject.sizes, hands=3.0)
     own_sd = {block: np.zeros(len(coordinates)) for block in BLOCKS}
-    state = (own_sd, x, np.zeros((len(x), len(x))), np.zeros((0, 6)), [])
+    state: tuple[Any, ...] = (own_sd, x, np.zeros((len(x), len(x))), np.zeros((0, 6)), [])
     without, held = (each.added(*state, late=True)["moments"] for each in (subject, with_it))
     np.testing.assert_allclose(held[inner] ** 2 - without[inner] ** 2, 9.0 * borne[inner], atol=1e-9)

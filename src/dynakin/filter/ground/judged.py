@@ -305,9 +305,16 @@ def _taken_in_words(plate: str, contact: str) -> str:
 
 
 def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str | None) -> str:
-    """What to do about a plate that is refused for where it is pressed while a declared contact has none."""
+    """What to do about a plate that is refused for where it is pressed: something else than a foot may bear on it."""
     names = [name for name in initial.contacts if loads is not None and name not in loads.others]
-    if not names or plate is None:
+    if plate is None or not initial.feet:
+        return ""
+    if not initial.contacts:
+        return (
+            f". If a chair, a hand or a knee is on {plate}, declare it (--contact seat, hand_right or knee=shank_l), "
+            "else correct the plate's place or its unit"
+        )
+    if not names:
         return ""
     return f'. If {plate} bears the {names[0]}, say so in a configuration: plates = {{ "{plate}" = "{names[0]}" }}'
 
