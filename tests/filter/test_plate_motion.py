@@ -13,6 +13,7 @@ import pytest
 
 import dynakin
 from dynakin import Estimator, Subject, load_model
+from dynakin.cli.check_rows import model_rows
 from dynakin.errors import RecordingError
 from dynakin.filter.ground import axes
 from dynakin.filter.ground.coarse_delay import plates_delay
@@ -24,6 +25,7 @@ from dynakin.messages import about, warnings_of
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.resampling import low_pass
 from dynakin.results.measures.sources import ABSENT
+from dynakin.settings.settings import Settings
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.held_out import measured_wrench
@@ -271,6 +273,8 @@ def test_what_plates_carry_beyond_the_mass_may_be_in_the_hands(times: float) -> 
     said = [message for message in about(ready.messages, "carried") if "more than the mass" in message.text]
     assert ready.ground.in_hands_kg == (pytest.approx(2.8, abs=0.3) if times > 1.02 else 0.0)
     assert [message.level for message in said] == (["note"] if times > 1.02 else [])
+    rows = [text for title, text in model_rows(ready, Settings(), None) if title == "Results"]
+    assert all(message.text in rows for message in said)
 
 
 def test_deviations_hold_what_the_hands_may_hold_and_nothing_is_absent_by_it() -> None:
