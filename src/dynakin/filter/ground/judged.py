@@ -24,7 +24,7 @@ from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
 from dynakin.filter.ground.needed import Needed
-from dynakin.filter.ground.plate_sum import judged_by_motion
+from dynakin.filter.ground.plate_sum import doubtful_mass, judged_by_motion
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
 from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear
 from dynakin.messages import Message, about, note, warning
@@ -221,7 +221,8 @@ class Standing:
         )
         notes += [*check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
         in_hands_kg = 0.0 if loads is None else more_than_the_mass(initial, judged.load_ratio)
-        if in_hands_kg and not about(notes, "carried"):
+        doubted = doubtful_mass(wrench, initial.weighed_kg, judged.load_ratio, initial.unseen_kg)  # which says it, too
+        if in_hands_kg and not about(notes, "carried") and doubted is None:
             notes.append(note("carried", in_hands_in_words(in_hands_kg)))
         reasons = [*([VERTICAL_ONLY] if shear.unmeasured else []), *judged.reasons]
         undeclared = judged.undeclared
