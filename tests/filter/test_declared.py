@@ -30,6 +30,7 @@ from dynakin.simulation.trial import simulate
 WEIGHT = 70.0 * 9.80665
 LEGS = ("hip_flexion_r", "knee_angle_r", "ankle_angle_r", "hip_flexion_l", "knee_angle_l", "ankle_angle_l")
 LEAST_N = 20.0
+KINDS = ("force", "moment")
 
 
 def person() -> dynakin.ModelDefinition:
@@ -91,8 +92,9 @@ def test_feet_on_plates_stay_measured_under_a_declared_seat_and_so_do_legs_and_t
 def test_a_declared_seat_is_in_the_files(tmp_path: Path) -> None:
     estimate = seated(1, "feet")
     assert estimate.foot_names == ["right", "left"] and estimate.contact_names == ["right", "left", "seat"]
-    figures = contact_figures(estimate, np.ones(len(estimate.time), dtype=bool))["seat"]
-    assert figures["derived"] == figures["frames"] > 50 and figures["measured"] == figures["absent"] == 0
+    figures = contact_figures(estimate)["seat"]
+    bears = estimate.data["foot_contact"].sel(foot="seat").values != NO_CONTACT  # before the window of the figures, too
+    assert figures["derived"] == figures["frames"] == bears.sum() > 50 and figures["measured"] == figures["absent"] == 0
     assert 0.2 * WEIGHT < figures["force_n"]["fy"] < 0.6 * WEIGHT and figures["sd_n"]["fy"] > 1.0
     write_body_files(estimate, tmp_path)
     write_deviations(estimate, tmp_path / "uncertainty.sto")
@@ -272,10 +274,31 @@ def test_a_foots_plate_is_not_taken_for_the_seats() -> None:
     assert any("plate 1 lies off its place" in message.text for message in warnings_of(under.messages))
     with pytest.raises(RecordingError, match=r'If plate 1 bears the seat, .* plates = \{ "plate 1" = "seat" \}'):
         estimator.prepare(at_a_distance(0.8))
+    with pytest.raises(RecordingError, match=r"on plate 1, declare it \(--contact seat, hand_right or knee=shank_l\)"):
+        dynakin.Estimator(person()).prepare(at_a_distance(0.8))
     lying = [replace(plate, force=plate.force[:, [1, 0, 2]]) for plate in (foot, other)]
     with pytest.raises(RecordingError, match="the forces lie along") as refused:  # no plate of its own is in question
         estimator.prepare(recording.with_plates(tuple(lying)))
     assert "bears the seat" not in str(refused.value)
+
+
+def test_a_seat_on_the_plate_of_the_feet_bears_and_leaves_no_moment_there() -> None:
+    """It "bore nothing in this recording that shows", and the legs' moments were a prior's all the time."""
+    trial = sit(1, "all")
+    force, moment = (
+        np.sum([np.nan_to_num(getattr(p, kind)) for p in trial.recording.plates], axis=0) for kind in KINDS
+    )
+    cop = np.stack([moment[:, 2], np.zeros(len(force)), -moment[:, 0]], axis=1) / force[:, [1]]
+    one = Plate("one", force, moment, cop, moment - np.cross(cop, force), None)
+    ready = dynakin.Estimator(person(), contacts=["seat"]).prepare(trial.recording.with_plates((one,)))
+    seat = trial.truth.data["contact_wrench"].sel(contact="seat", component="fy").values
+    bears = ready.ground.bears[:, 0]
+    assert bears[seat > 2.0 * LEAST_N].all() and bears.mean() < 0.1 + (seat > LEAST_N).mean()
+    legs = ready.moment_figures()["legs"].values()
+    assert all(leg["absent"] == bears.sum() and leg["prior"] == (~bears).sum() for leg in legs)
+    said = [message.text for message in ready.ground.reasons]
+    assert any("one presses beyond both feet" in text for text in said)
+    assert not any("derived from the motion" in text for text in said)
 
 
 def test_contacts_of_a_configuration_come_back(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates
 from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes, usual_sizes
+from dynakin.filter.in_hands import HANDS, Hands
 from dynakin.filter.joint_errors import SKIN_ANGLE_RAD, JointErrors
 from dynakin.filter.reported_sd import (
     BLOCKS,
@@ -28,8 +29,10 @@ from dynakin.filter.reported_sd import (
     reported,
 )
 from dynakin.filter.systematic import _STEP_S, COMMON, ROOT_SKIN, Systematic
+from dynakin.model.calibration.declared import with_loads
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
 from dynakin.settings.noise import Noise
+from dynakin.settings.subject import CarriedLoad
 from support.made_in_space import measured
 
 Array = npt.NDArray[np.float64]
@@ -44,10 +47,10 @@ CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
 RATE = np.array([-900.0, 4000.0, 300.0, 200.0, 100.0, 700.0])
 """By how much the contact changes, N and N m a second."""
-SIZES = (0.01, 0.02, 0.03, 0.05, 0.04, 0.06, 0.07, 0.008, 0.3, 0.015, 0.5, 0.004)
+SIZES = (0.01, 0.02, 0.03, 0.05, 0.04, 0.06, 0.07, 0.008, 0.3, 0.015, 0.5, 0.004, 2.0)
 MOVING, MOMENTS_MOVING, OFF_PLATES = 0.1, 0.05, 0.2
 NONE = Sizes(
-    *np.zeros(len(SIZES)),
+    *np.zeros(len(SIZES) - 1),
     placed=np.inf,
     own_speeds=MOVING,
     own_moments=MOMENTS_MOVING,
@@ -395,6 +398,7 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     external[2] = CONTACT
     parts = subject.parts(Q, QD, QDD, external)
     parts["clock"] = {block: np.zeros(10) for block in BLOCKS} | {"moments": np.square(by_rate())}
+    parts["hands"] = {block: np.zeros(10) for block in BLOCKS}  # a leg has none
     sizes = dict(zip(KINDS, SIZES, strict=True))
     intense = np.mean(QDD**2) / 4.0
     nothing = Systematic(calibrated(), Noise(), subject.sizes.scaled(0.0))
@@ -636,8 +640,8 @@ def test_of_a_heavy_person_the_tables_are_not_believed_and_that_is_said() -> Non
 
 def test_a_clock_that_is_known_worse_counts_for_more() -> None:
     subject = Systematic(calibrated(), Noise())
-    assert subject.with_clock(0.5 * subject.sizes.clock) is subject
-    coarse = subject.with_clock(0.01)
+    assert subject.with_ground(0.5 * subject.sizes.clock).sizes == subject.sizes
+    coarse = subject.with_ground(0.01)
     assert coarse.sizes == replace(subject.sizes, clock=0.01) and subject.sizes.clock < 0.01
     own = dict.fromkeys(BLOCKS, np.zeros(10))
     state = (own, np.r_[Q, QD, QDD], np.zeros((30, 30)), CONTACT[None], ["shank"])
@@ -645,3 +649,31 @@ def test_a_clock_that_is_known_worse_counts_for_more() -> None:
     still = subject.added(*state, late=True, wrench_rate=np.zeros((1, 6)))["moments"]
     by_clock = (less**2 - still**2) / (surer**2 - still**2)
     np.testing.assert_allclose(by_clock[surer > 1.001 * still], (0.01 / subject.sizes.clock) ** 2)
+
+
+def test_a_load_in_the_hands_counts_in_the_moments_that_bear_it() -> None:
+    """As much as bodies do that are welded to both hands of a model that stands still, bent at the elbows."""
+    person = measured()
+    names = list(person.names)
+    x = np.array(person.x0)
+    x[[names.index(f"elbow_flex_{side}") for side in "rl"]] += 1.2
+    own = {segment.name: np.asarray(segment.inertia) for segment in person.spec.segments}
+    free = _core.joint_moments(_core.Model(person.spec), x, np.zeros((len(own), 6)))
+    square = np.zeros(len(free))
+    for hand in HANDS:
+        place = tuple(own[hand][1:4] / own[hand][0])
+        laden = with_loads(person, [CarriedLoad(segment=hand, mass_kg=1.0, place_m=place)])
+        square += 0.5 * np.square(_core.joint_moments(_core.Model(laden.spec), x, np.zeros((len(own) + 1, 6))) - free)
+    coordinates = [c.name for c in person.spec.coordinates]
+    borne = Hands(person.spec).variances(x, len(coordinates))
+    inner = [k for k, name in enumerate(coordinates) if not name.startswith("pelvis")]
+    np.testing.assert_allclose(borne[inner], square[inner], atol=1e-9)
+    elbow, knee = (coordinates.index(name) for name in ("elbow_flex_r", "knee_angle_r"))
+    assert 1.0 < np.sqrt(borne[elbow]) < 3.0 and borne[knee] == 0.0
+    subject = Systematic(person, Noise())
+    with_it = subject.with_ground(0.0, 3.0)
+    assert with_it.sizes == replace(subject.sizes, hands=3.0)
+    own_sd = {block: np.zeros(len(coordinates)) for block in BLOCKS}
+    state: tuple[Any, ...] = (own_sd, x, np.zeros((len(x), len(x))), np.zeros((0, 6)), [])
+    without, held = (each.added(*state, late=True)["moments"] for each in (subject, with_it))
+    np.testing.assert_allclose(held[inner] ** 2 - without[inner] ** 2, 9.0 * borne[inner], atol=1e-9)

@@ -12,7 +12,7 @@ from dynakin import read
 from dynakin.errors import ConfigError
 from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, REASONS, SHARED, SWING
+from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, REASONS, SHARED, SWING, UNKNOWN
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.ground_plate import saturated
 from dynakin.recordings.recording import Plate, Recording
@@ -106,6 +106,25 @@ def test_two_feet_on_one_plate_share_it_and_their_sum_is_what_was_measured() -> 
         loads.wrench[0, :, 1], [450.0, 150.0], rtol=1e-3
     )  # 0.05 lies at three quarters of -0.1 to 0.1
     assert any("Both feet stand on a" in text for text in map(str, loads.messages))
+
+
+@pytest.mark.parametrize("behind_m", [0.0, 0.1, 0.4])
+def test_what_else_bears_on_the_plate_of_both_feet_is_not_theirs(behind_m: float) -> None:
+    """A chair behind them for the first two seconds: moments were a prior's all the time, a hip 35 N m off, said to 22.
+    The pressure of who leans back lies at the heels."""
+    places = at(0.01, 0.0)
+    places[:200, 0] -= behind_m
+    loads = foot_loads(walker({}, (plate("a", np.full(T, 600.0), places),)), LABORATORY, MARKERS)
+    chair = behind_m > 0.2
+    assert (loads.reason[:200] == (UNKNOWN if chair else SHARED)).all() and (loads.reason[250:] == SHARED).all()
+    assert (loads.total_known[:200] == (not chair)).all() and loads.total_known[250:].all()
+    assert (loads.elsewhere[:200] == chair).all() and not loads.elsewhere[250:].any()
+    said = [text for text in loads.reasons if "presses beyond both feet" in text.text]
+    assert [text.level for text in said] == ["warning"] * chair
+    moved = foot_loads(
+        walker({}, (plate("a", np.full(T, 600.0), places),)), LABORATORY, MARKERS, assigned={"a": "left"}
+    )
+    assert not any("presses beyond" in text.text for text in moved.messages)
 
 
 @pytest.mark.parametrize("corners", [None, CORNERS - [0.0, 0.0, 0.2]])

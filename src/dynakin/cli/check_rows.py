@@ -9,7 +9,7 @@ import numpy as np
 from dynakin.cli.prepared import Rows, assumed, contacts, in_a_row, short
 from dynakin.errors import DynakinError
 from dynakin.filter.prepared import Prepared
-from dynakin.messages import Message, about, warnings_of
+from dynakin.messages import Message, about, notes_of, warnings_of
 from dynakin.model.markers.fit import fits
 from dynakin.pipeline.stages import prepare_case
 from dynakin.recordings.companions import companion_forces, companion_static
@@ -115,6 +115,7 @@ def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None
     doubts = [message for message in warnings_of(ready.messages) if message not in said]
     there = [sentence(message.text) for message in doubts]  # with what to do
     rows += [("Results", text) for text in (figures["verdict"], *figures["reasons"]) if text not in there]
+    rows += [("Results", message.text) for message in notes_of(about(ready.messages, "carried"))]
     rows += [("Doubts", message) for message in doubts]
     return rows + [("Time", text) for text in _time(ready)]
 

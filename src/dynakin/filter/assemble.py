@@ -20,7 +20,7 @@ from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import hidden_segments, with_sources
 from dynakin.filter.systematic import Systematic
 from dynakin.filter.taken import with_taken
-from dynakin.messages import Message, about, note, warning
+from dynakin.messages import Message, about, note, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import ON_PLATE, UNMEASURED
@@ -97,7 +97,7 @@ def assemble(
         initial.unmarked_feet.values(),
         hidden_segments(initial.spec, measured[0], recording.time),
         beyond,
-        bool(about(notes, "carried")),
+        bool(warnings_of(about(notes, "carried"))),
     )
     if feet is not None:
         _widen_priors(data, prior_factor(used), feet.blind)

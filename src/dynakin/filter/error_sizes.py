@@ -11,7 +11,7 @@ from dynakin.filter.joint_errors import Kind
 from dynakin.model.calibration.calibrated import CalibratedModel
 
 OF_JOINTS = get_args(Kind)
-KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "limbs", "clock")
+KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "limbs", "clock", "hands")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
 CENTRES = ("hinge_centre", "ball_centre", "ball_across")
 """What goes by how far markers have moved, too."""
@@ -45,6 +45,7 @@ class Sizes:
             plates do not see they do not correct, and small innovations do not show it.
         inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
             `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
+        hands: kg, of what both hands may hold together that the model does not have (`Ground.in_hands_kg`).
     """
 
     hinge_centre: float
@@ -65,6 +66,7 @@ class Sizes:
     vigorous: float
     own_off_plates: float
     inertia: bool = True
+    hands: float = 0.0
 
     def scaled(self, factor: float) -> Sizes:
         """The errors of joints, skin, centres of mass, limbs and clock times a factor."""

@@ -328,7 +328,7 @@ class Estimator:
             notes += [place] if place else []
         if tracker.systematic is not None:
             notes += tracker.systematic.misfit(arrays["state"][-1])
-        systematic = tracker.systematic and tracker.systematic.with_clock(ground.clock_sd_s)
+        systematic = tracker.systematic and tracker.systematic.with_ground(ground.clock_sd_s, ground.in_hands_kg)
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(
             arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances,

@@ -13,7 +13,7 @@ from dynakin.filter.ground.judged import Ground
 from dynakin.filter.labels import labels
 from dynakin.filter.sources import ContactSources, hidden_segments
 from dynakin.filter.tracker import Tracker
-from dynakin.messages import Message, about
+from dynakin.messages import Message, about, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, source_figures
@@ -71,7 +71,7 @@ class Prepared:
 
         calibrated = self.calibrated
         known = ContactSources.of(calibrated)
-        sources = known.moments(self.contacts, carried=bool(about(self.ground.notes, "carried")))
+        sources = known.moments(self.contacts, carried=bool(warnings_of(about(self.ground.notes, "carried"))))
         if self.contacts is None:
             blind = np.isnan(self.wrench).all(axis=1)
             codes = np.where(self.ground.undeclared, ABSENT, np.where(blind, DERIVED, MEASURED))

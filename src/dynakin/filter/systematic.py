@@ -19,6 +19,7 @@ from scipy.linalg import cho_factor, cho_solve
 from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates, wrenches_of
 from dynakin.filter.error_sizes import KINDS, OF_JOINTS, Sizes, less_sure_joints, usual_sizes
+from dynakin.filter.in_hands import Hands
 from dynakin.filter.joint_errors import SKIN_ANGLE_RAD, JointErrors, drives, floats, neutral, rolls
 from dynakin.filter.limbs import unseen_limbs, unsure_moments
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
@@ -92,7 +93,7 @@ class Systematic:
         self._R0 = _core.segment_poses(self._errors.model, x)[0]
         self._D0 = self._displacements(_core.marker_jacobian(self._errors.model, x))
         self._D0[:, [kind == "root" for kind in self._errors.kinds]] = 0.0
-        self._model = _core.Model(spec)
+        self._model, self._hands = _core.Model(spec), Hands(spec)
         self._constants = np.array(calibrated.x0)
         self._rolls = [first[name] for name in rolls(spec) if name in first]
         gain, N = self._gain(x)
@@ -105,12 +106,11 @@ class Systematic:
             k for k, name in enumerate(calibrated.names) if self.sizes.inertia and name.startswith("inertia/")
         ]
 
-    def with_clock(self, sd_s: float) -> Systematic:
-        """The same, where the plates' clock is not known as well as in a walk whose segments are all marked."""
-        if not sd_s > self.sizes.clock:
-            return self
+    def with_ground(self, clock_sd_s: float, in_hands_kg: float = 0.0) -> Systematic:
+        """The same, where the plates' clock is not known as well as in a walk whose segments are all marked, or the
+        hands may hold something that the model does not have."""
         other = copy(self)
-        other.sizes = replace(self.sizes, clock=sd_s)
+        other.sizes = replace(self.sizes, clock=max(clock_sd_s, self.sizes.clock), hands=in_hands_kg)
         return other
 
     def _displacements(self, jacobian: Array) -> Array:
@@ -289,10 +289,12 @@ class Systematic:
         external = self._external(wrench, segments)
         still = np.zeros(K)
         by_inertia = self._by_inertia(x, inertia, external)
+        by_hands = self._hands.variances(x, self._count) if self.sizes.hands else np.zeros(self._count)
         by_clock = np.zeros(self._count) if wrench_rate is None else self._by_clock(x, wrench_rate, segments)
         return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external, used) | {
             "inertia": self._labelled(still, still, still, by_inertia),
             "clock": self._labelled(still, still, still, by_clock),
+            "hands": self._labelled(still, still, still, by_hands),
         }
 
     def added(

@@ -12,17 +12,22 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.axes import turned_axes
-from dynakin.filter.ground.carried import carried_in_hands, carried_in_words
+from dynakin.filter.ground.carried import (
+    carried_in_hands,
+    carried_in_words,
+    in_hands_in_words,
+    more_than_the_mass,
+)
 from dynakin.filter.ground.coarse_delay import plates_delay
 from dynakin.filter.ground.declared import may_bear, plate_of_its_own
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
 from dynakin.filter.ground.needed import Needed
-from dynakin.filter.ground.plate_sum import judged_by_motion
+from dynakin.filter.ground.plate_sum import doubtful_mass, judged_by_motion
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
 from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear
-from dynakin.messages import Message, note, warning
+from dynakin.messages import Message, about, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
@@ -54,6 +59,8 @@ class Ground:
         notes: what there is to say. reasons: those of them that say why something is not measured.
         behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how far they
             may be out of it still; 0: no farther than usual.
+        in_hands_kg: what the plates carry more than the mass, where that is more than they are usually off by: the
+            hands may hold it.
     """
 
     loads: FootLoads | None
@@ -67,6 +74,7 @@ class Ground:
     off_gain: Array | None = None
     behind_s: float = 0.0
     clock_sd_s: float = 0.0
+    in_hands_kg: float = 0.0
 
 
 class Trial(NamedTuple):
@@ -212,6 +220,10 @@ class Standing:
             recording, initial, trial.markers, wrenches, loads, check, self.may, self.by_plate, trial.tolerance
         )
         notes += [*check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
+        in_hands_kg = 0.0 if loads is None else more_than_the_mass(initial, judged.load_ratio)
+        doubted = doubtful_mass(wrench, initial.weighed_kg, judged.load_ratio, initial.unseen_kg)  # which says it, too
+        if in_hands_kg and not about(notes, "carried") and doubted is None:
+            notes.append(note("carried", in_hands_in_words(in_hands_kg)))
         reasons = [*([VERTICAL_ONLY] if shear.unmeasured else []), *judged.reasons]
         undeclared = judged.undeclared
         if loads is not None:
@@ -227,7 +239,8 @@ class Standing:
         notes += reasons
         texts = tuple(notes), tuple(reasons)
         off_gain = None if loads is None or not gains.notes else gains.of_feet(loads)
-        return Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, *texts, shear, off_gain), wrench
+        found = Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, *texts, shear, off_gain)
+        return replace(found, in_hands_kg=in_hands_kg), wrench
 
     def _sensors(self, needed: Needed, loads: FootLoads) -> tuple[list[Message], Shear, PlateGains]:
         """What the motion says of the rate, of what is carried, or else of the plates' horizontal forces and gains."""
@@ -293,9 +306,16 @@ def _taken_in_words(plate: str, contact: str) -> str:
 
 
 def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str | None) -> str:
-    """What to do about a plate that is refused for where it is pressed while a declared contact has none."""
+    """What to do about a plate that is refused for where it is pressed: something else than a foot may bear on it."""
     names = [name for name in initial.contacts if loads is not None and name not in loads.others]
-    if not names or plate is None:
+    if plate is None or not initial.feet:
+        return ""
+    if not initial.contacts:
+        return (
+            f". If a chair, a hand or a knee is on {plate}, declare it (--contact seat, hand_right or knee=shank_l), "
+            "else correct the plate's place or its unit"
+        )
+    if not names:
         return ""
     return f'. If {plate} bears the {names[0]}, say so in a configuration: plates = {{ "{plate}" = "{names[0]}" }}'
 

@@ -13,7 +13,7 @@ from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in
 from dynakin.filter.ground.fine_delay import UNKNOWN_S, clock_delay
 from dynakin.filter.ground.judged import Ground, Standing, Trial
 from dynakin.filter.ground.plate_sum import MASS_APART
-from dynakin.messages import Message, about, note, warning
+from dynakin.messages import Message, about, note, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.zero_offset import without_offsets
 from dynakin.recordings.recording import Recording
@@ -89,7 +89,7 @@ def _clock(
     whole, fine, left = not initial.unseen_kg, None, None
     for _ in range(ROUNDS):
         plates = trial.in_step(fine or coarse or IN_STEP).wrenches
-        left = clock_delay(initial, time, trial.markers, known, not about(ground.notes, "carried"), plates)
+        left = clock_delay(initial, time, trial.markers, known, not warnings_of(about(ground.notes, "carried")), plates)
         if left is None or not left.worth_it(whole or coarse is not None or fine is not None):
             break
         fine = left.after(fine or coarse or IN_STEP)

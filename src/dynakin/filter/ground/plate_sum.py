@@ -95,7 +95,8 @@ def judged_by_motion(
         )
     bears = bearing(found, may, names, by_plate, claimed, recording.rate)
     if bears.any():
-        reasons.append(note("plates", _declared_in_words(found, bears, names, recording.time)))
+        if (derived := bears & ~undeclared[:, None]).any():
+            reasons.append(note("plates", _declared_in_words(found, derived, names, recording.time)))
         found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
     undeclared |= found.undeclared | _nearly_all(found)
     if found.too_much is not None and loads is not None:  # where the other foot is off the plates, too
@@ -228,7 +229,8 @@ def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unsee
     within = MASS_APART + UNSEEN_APART * unseen_kg / mass_kg
     if load is None or abs(load - mass_kg) <= within * mass_kg:
         return None
-    carried = ", or a load is carried (moments of back and arms are wrong by it)" if load > mass_kg else ""
+    held = "" if load_ratio is None else ", which their deviations hold"
+    carried = f", or a load is carried (moments of back and arms are wrong by it{held})" if load > mass_kg else ""
     return warning(
         "weight",
         f"the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "

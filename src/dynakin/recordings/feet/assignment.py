@@ -351,6 +351,11 @@ class _Assignment:
         said += plate_findings(
             self.recording.time, self.feet, contacts, [self.plates[p] for p in own], soles, self.on[:, :, own]
         )
+        for p, plate in enumerate(self.plates):
+            beyond = self.sharing.beyond[:, p] & (self.on[:, :, p].sum(axis=1) > 1)
+            if beyond.any() and plate.name not in self.fixed:
+                loads = loads.without(self.on[:, :, p] & beyond[:, None]).with_undeclared(beyond)
+                reasons.append(who.something_else(p, beyond))
         if missing := [foot for foot in self.feet if foot not in self.contacts]:
             said.append(
                 note(

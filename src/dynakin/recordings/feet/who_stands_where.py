@@ -105,6 +105,15 @@ class WhoStandsWhere:
         )
         return [note("plates", text)]
 
+    def something_else(self, p: int, beyond: Flags) -> Message:
+        """On frames (T,) in which a plate under both feet presses beyond both."""
+        return warning(
+            "plates",
+            f"{self.plates[p].name} presses beyond both feet that stand on it, from {spans(self.time, runs(beyond))}: "
+            "something else bears on it, too (a chair, a hand, a knee), or it lies off its place; what each of them "
+            "bears is not known there. Record what else bears beside that plate, or on one of its own.",
+        )
+
     def _lost(self, p: int) -> list[Message]:
         plate, time = self.plates[p], self.time
         found = [

@@ -72,8 +72,8 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     return figures | {"verdict": _words(figures, int(grounded.sum()), len(contact), FLIGHT * weight)}
 
 
-def contact_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, Any]:
-    """Of each declared contact, over the frames ``window``; empty where none was declared.
+def contact_figures(estimate: Estimate) -> dict[str, Any]:
+    """Of each declared contact, over all frames, as `moment_figures`; empty where none was declared.
 
     Returns:
         by name: ``frames`` in which it bears, and of these those that are ``measured``, ``derived``, ``prior`` and
@@ -83,7 +83,7 @@ def contact_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[s
     found: dict[str, Any] = {}
     for name in estimate.contact_names[len(estimate.foot_names) :]:
         own = estimate.data.sel(foot=name)
-        bears = window & (own["foot_contact"].values != NO_CONTACT)
+        bears = own["foot_contact"].values != NO_CONTACT
         codes = foot_sources(estimate.data)[bears, estimate.contact_names.index(name)]
         force, sd = (values_of(own, key)[bears, :3] for key in ("foot_wrench", "foot_wrench_sd"))
         known = np.isfinite(force).all(axis=1)

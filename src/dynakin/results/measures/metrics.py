@@ -81,7 +81,7 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
         "angles": lambda: _angles(estimate),
         "asymmetry": lambda: asymmetry(estimate, window),
         "feet": lambda: foot_figures(estimate, window),
-        "contacts": lambda: contact_figures(estimate, window),
+        "contacts": lambda: contact_figures(estimate),
         "events": lambda: _events(estimate),
         "timing": lambda: asdict(estimate.timing),
     }
