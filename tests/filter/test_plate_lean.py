@@ -74,6 +74,15 @@ def test_plates_in_order_follow_it(legs: tuple[Recording, Prepared]) -> None:
     assert turned_by_lean(walk.plates, ready.calibrated, root_path(ready.calibrated, ready.markers), walk.rate) is None
 
 
+def test_one_side_of_a_pelvis_shows_no_lean(legs: tuple[Recording, Prepared]) -> None:
+    """Its markers lie a hand's breadth beside the middle: plates in order had a "second axis" that was reversed."""
+    walk, _ = legs
+    kept = [k for k, name in enumerate(walk.marker_names) if "L" not in name[0] and "ankle_l" not in name]
+    right = replace(walk, marker_names=tuple(walk.marker_names[k] for k in kept), markers=walk.markers[:, kept])
+    ready = person().prepare(right)
+    assert np.isnan(root_path(ready.calibrated, ready.markers)).all()
+
+
 def test_a_squat_shows_nothing_of_it() -> None:
     """Its pelvis goes back and forth behind the feet, and the trunk the other way."""
     squat = simulate("fullbody", "squat", 7, 8.0).recording

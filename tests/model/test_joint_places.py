@@ -14,6 +14,7 @@ from dynakin.bindings import _core
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.parameters import parameters_of
 from dynakin.model.calibration.checks import fixed_lengths
+from dynakin.model.plan import SUPPOSED_AXIS
 from dynakin.model.schema import Length, ModelFile, Segment, kinds_of
 from dynakin.report.findings.finding import Insight
 from dynakin.report.insights import insights
@@ -166,7 +167,7 @@ def test_the_outer_end_of_a_knees_axis_may_lie_farther_forward_on_each_side_for_
     names, core = list(initial.names), _core.Model(initial.spec)
     for side, out in (("r", 1.0), ("l", -1.0)):
         k, knee = names.index(f"length/knee_axis_{side}"), names.index(f"knee_angle_{side}")
-        assert initial.x0[k] == 0.0 and initial.sd0[k] == pytest.approx(0.05)
+        assert initial.x0[k] == 0.0 and initial.sd0[k] == pytest.approx(SUPPOSED_AXIS * 0.05)  # one marker on each knee
         shank, thigh = (list(core.segment_names).index(f"{part}_{side}") for part in ("shank", "thigh"))
         straight = core.initial_state()
         straight[knee] = 0.0

@@ -18,9 +18,11 @@ from dynakin.filter.estimator import Tracked
 from dynakin.filter.systematic import Systematic
 from dynakin.messages import about
 from dynakin.model.definition import load_model
+from dynakin.model.plan import SUPPOSED_AXIS
 from dynakin.recordings.recording import Recording
 from dynakin.report.insights import insights
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.settings.model import Priors
 from dynakin.settings.noise import Noise
 from dynakin.settings.subject import Subject
 from dynakin.simulation.output import SimulatedTrial
@@ -154,6 +156,9 @@ def test_a_joint_with_a_lateral_marker_alone_is_less_sure() -> None:
     assert set(one.one_sided_joints) == {*JOINTS}
     legs = ("shank_r", "shank_l", "foot_r", "foot_l")
     assert less_sure_joints(one) == dict.fromkeys(legs, ONE_SIDED)
+    assert both.plan is not None and one.plan is not None
+    axes = [each.plan.prior(Priors())["length/knee_axis_r"] for each in (both, one)]
+    assert axes == pytest.approx([0.05, SUPPOSED_AXIS * 0.05])  # it is laid between pelvis and foot
     moments = [Systematic(each, Noise()) for each in (both, one)]
     spread = [np.linalg.norm(each._errors.sources, axis=0).max() for each in moments]
     assert spread[1] > 1.5 * spread[0]

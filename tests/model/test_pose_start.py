@@ -96,6 +96,21 @@ def test_finds_any_pose_at_any_heading(seed: int) -> None:
     assert not fit.x[n : 3 * n].any()  # at rest
 
 
+@pytest.mark.parametrize("facing", [0.1, 2.0, -3.0])
+def test_an_upright_person_has_no_list_beyond_a_quarter_turn(facing: float) -> None:
+    """A fit that begins with the other reading of the same pose said 180 deg of list of somebody in a squat."""
+    model = person()
+    x, _ = posed(model, np.random.default_rng(2))
+    tilt, list_, turn = (model.coordinate_names.index(name) for name in ("tilt", "list", "turn"))
+    x[tilt], x[list_], x[turn] = -0.7, 0.05, facing
+    other = x.copy()
+    other[tilt], other[list_], other[turn] = x[tilt] + np.pi, np.pi - x[list_], x[turn] + np.pi
+    markers = _core.marker_positions(model, x)
+    np.testing.assert_allclose(_core.marker_positions(model, other), markers, atol=1e-9)
+    fit = start_posture(model, markers, guess=other, limits=limits(model))
+    assert [fit.coordinates[name] for name in ("tilt", "list", "turn")] == pytest.approx([-0.7, 0.05, facing], abs=0.02)
+
+
 def test_a_locked_coordinate_stays_and_frames_are_averaged() -> None:
     model = person(locked=("twist",))
     x, markers = posed(model, np.random.default_rng(3))

@@ -480,6 +480,49 @@ def test_sides_before_and_behind_the_rest() -> None:
         assert match.names == {("ASI", "right"): names[0], ("ASI", "left"): names[1]}
 
 
+SPELT = {  # right and left of a name "RASI", "LASI"
+    "polish": lambda name: {"R": "P"}.get(name[0], name[0]) + name[1:],
+    "slovene": lambda name: {"R": "D"}.get(name[0], name[0]) + name[1:],
+    "spanish": lambda name: f"{name[1:]}_{'D' if name[0] == 'R' else 'I'}",
+    "french": lambda name: f"{'d' if name[0] == 'R' else 'g'} {name[1:]}",
+    "hungarian": lambda name: f"S01_{'J' if name[0] == 'R' else 'B'}_{name[1:]}",
+}
+
+
+@pytest.mark.parametrize("language", SPELT)
+def test_sides_of_another_language_are_those_of_english(language: str) -> None:
+    """One leg alone was known by them, and plates were blamed for what the other bore."""
+    own = recognised("plug-in-gait-lower-body")
+    foreign = renamed(walking("plug-in-gait-lower-body"), SPELT[language])
+    found = recognise(foreign)
+    assert found.match.names == {key: SPELT[language](name) for key, name in own.match.names.items()}
+    assert warnings_of(found.messages) == warnings_of(own.messages) and not found.match.guessed
+    assert any(re.fullmatch(r"[DPJ] is read as right and [LIGB] as left\.", m.text) for m in found.messages)
+
+
+def test_letters_that_are_right_for_left_by_the_body_are_refused() -> None:
+    foreign = renamed(walking("plug-in-gait-lower-body"), lambda name: {"L": "P", "R": "L"}[name[0]] + name[1:])
+    with pytest.raises(RecordingError, match="seen in a mirror"):
+        find_ground_frame(foreign, pairs=recognise(foreign).match.facing_pairs)
+
+
+def test_half_a_body_in_an_unknown_language_is_refused() -> None:
+    latvian = renamed(walking("plug-in-gait-lower-body"), lambda name: {"R": "L", "L": "K"}[name[0]] + name[1:])
+    with pytest.raises(ModelError, match=r"L in names is read as left, K is not understood .*KANK, .*expected R and L"):
+        recognise(latvian)
+
+
+def test_letters_that_count_a_cluster_are_no_language() -> None:
+    """Posterior and lateral markers of one leg: its names say right already."""
+    leg = walking("plug-in-gait-lower-body")
+    kept = [k for k, name in enumerate(leg.marker_names) if name[0] == "R" or name[1:] in ("ASI", "PSI")]
+    names = (*(leg.marker_names[k] for k in kept), *(f"R{part}{end}" for part in ("TH", "SK", "FT") for end in "PL"))
+    markers = np.concatenate([leg.markers[:, kept], leg.markers[:, kept[:6]] + 0.02], axis=1)
+    found = recognise(replace(leg, marker_names=names, markers=markers))
+    assert {side for _, side in found.match.names} == {"right", "left"}
+    assert not any("is read as right" in m.text for m in found.messages)
+
+
 def test_two_persons_are_refused() -> None:
     one = [f"S1_{name}" for name in walking("plug-in-gait").marker_names]
     both = [*one, *(name.replace("S1_", "S2_") for name in one)]

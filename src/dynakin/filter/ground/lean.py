@@ -38,13 +38,19 @@ where feet lie so far aside (RMS of the lean; a run's 0.01 to 0.03 show nothing)
 to 0.8."""
 
 
+BESIDE_M = 0.03
+"""How far the mean of the pelvis' markers may lie beside its middle: three quarters of `ASIDE` under a centre of mass
+1 m up. Those of one side (0.09 to 0.13 m) make a body lean over that foot as it does over neither."""
+
+
 def root_path(initial: CalibratedModel, markers: Array) -> Array:
     """(T, 3) m, ground frame: mean of the markers (T, M, 3) on the pelvis; NaN where one of them is missing that most
-    frames show."""
+    frames show, and throughout where they show one side of it alone."""
     roots = {segment.name for segment in initial.spec.segments if segment.parent == "ground"}
-    own = markers[:, [k for k, marker in enumerate(initial.spec.markers) if marker.segment in roots]]
+    on_root = [k for k, marker in enumerate(initial.spec.markers) if marker.segment in roots]
+    own, places = markers[:, on_root], np.array([initial.spec.markers[k].position for k in on_root]).reshape(-1, 3)
     often = np.isfinite(own).all(axis=2).mean(axis=0) > 0.5
-    if not often.any():
+    if not often.any() or abs(places[often, 2].mean()) > BESIDE_M:
         return np.full((len(markers), 3), np.nan)
     return np.asarray(own[:, often].mean(axis=1))
 

@@ -47,6 +47,7 @@ class LandmarkFinder:
     height_m: float | None = None  # for joint widths
     widths_m: Mapping[str, float] = field(default_factory=dict)  # of joints as somebody measured them: "knee_r"
     sole: Mapping[str, float] = field(default_factory=dict)  # side -> slope (rad) of heel to toe on a flat foot
+    supposed_axes: set[str] = field(default_factory=set)  # joints whose axis is laid between pelvis and foot
     usual_widths: set[str] = field(default_factory=set)  # joints whose width is that of an adult of this height
     _chosen: dict[tuple[str, str], Recipe | None] = field(default_factory=dict)
 
@@ -280,6 +281,8 @@ class LandmarkFinder:
     def _offset(self, offset: Offset, side: str, point: Callable[[str], Array], positions: Positions) -> Array:
         foot = [point(name) for name in offset.foot] if offset.foot else None
         across = lateral(self._apart(offset.asis, side, positions), foot, side) if offset.inward else None
+        if offset.inward and offset.width:
+            self.supposed_axes.add(f"{offset.width}{SUFFIXES[side]}")
         scale = offset.scale
         width_m = self.widths_m.get(f"{offset.width}{SUFFIXES[side]}")
         if width_m is not None:

@@ -210,6 +210,7 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     plan = ModelPlan(
         model, geometry, start.coordinates, fixed_lengths(model, set(marked.bare), set(found.added)), inertia,
         {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
+        frozenset(finder.supposed_axes - {*(asked.functional or ())}),
     )  # fmt: skip
     report(model, plan, mass_kg, messages)
     trial = trials.as_asked if model.floating else still.trial

@@ -7,7 +7,7 @@ by the core's bounded least squares; limbs that do not fit are started again els
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +16,7 @@ from dynakin.arrays import rms, wrapped
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.joint_motion import nearest_rotation
-from dynakin.model.calibration.posture import joint_coordinates, turned
+from dynakin.model.calibration.posture import joint_coordinates, other_reading, turned
 from dynakin.model.schema import Interval, kinds_of
 from dynakin.model.spec import free_names
 
@@ -31,6 +31,7 @@ MIRROR_RATIO = 0.6
 _UNITS = 3.0  # the markers' spread against the model's, beyond which the unit is wrong
 _REST = 1e-3  # m a radian: draws what no marker observes to where it was, moves what one does by nothing
 _RESTARTS = 4
+_SAME_M = 1e-6  # markers of one pose
 _ARM = 0.3  # m, at which an angle counts as a distance
 
 
@@ -180,6 +181,22 @@ class _Body:
 
     def fit(self, guess: Array | None = None) -> _Fit:
         """The best of several starts; the first good one where there is one."""
+        return self.read_as_usual(self._best(guess))
+
+    def read_as_usual(self, fit: _Fit) -> _Fit:
+        """The same fit with the root's turns by that of their two readings that turns less from rest: an upright
+        person, however they face, has no list beyond 90 deg. A fit that begins far off may end in the other one."""
+        if not self.floating:
+            return fit
+        other = fit.q.copy()
+        other[self.base] = other_reading(fit.q[self.base], self.turns[self.base])
+        other[self.base] = np.where(self.turns[self.base], wrapped(other[self.base]), other[self.base])
+        less = _turned(other - self.rest, self.turns) < _turned(fit.q - self.rest, self.turns)
+        within = np.all((other >= self.lower) & (other <= self.upper))
+        here, there = (_core.marker_positions(self.model, self.state(q)) for q in (fit.q, other))
+        return replace(fit, q=other) if less and within and np.allclose(here, there, atol=_SAME_M) else fit
+
+    def _best(self, guess: Array | None) -> _Fit:
         best: _Fit | None = None
         if guess is not None:
             best = self.solve(guess)
@@ -240,6 +257,10 @@ class _Body:
             found = self.solve(start)
             fit = found if found.rms < fit.rms else fit
         return fit
+
+
+def _turned(by: Array, turns: npt.NDArray[np.bool_]) -> float:
+    return float(np.abs(by[turns]).sum())
 
 
 def laid(points: Array, targets: Array) -> tuple[Array, Array] | None:

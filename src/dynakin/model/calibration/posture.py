@@ -78,12 +78,12 @@ def joint_coordinates(
         for k in np.flatnonzero(turns):
             fits += [fitted(rest + angle * np.eye(len(free))[k]) for angle in (_THIRD, -_THIRD)]
         # Three turns at right angles to each other have two readings of every pose.
-        fits += [fitted(_other_reading(q, turns)) for q, _ in fits]
+        fits += [fitted(other_reading(q, turns)) for q, _ in fits]
     best = min(fits, key=rank)[0]
     return {c.name: float(value) for c, value in zip(free, best, strict=True)}
 
 
-def _other_reading(values: Array, turning: npt.NDArray[np.bool_]) -> Array:
+def other_reading(values: Array, turning: npt.NDArray[np.bool_]) -> Array:
     """The same pose by three turns about axes at right angles to each other: half a turn more, the middle one's
     supplement, half a turn more; a start like any other where the axes are not."""
     found = values.copy()

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from dynakin.errors import ModelError
-from dynakin.model.markers.draft.by_name import said, worn
+from dynakin.model.markers.draft.by_name import said_together, worn
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import (
     SIDES,
@@ -88,7 +88,7 @@ def fits(recorded: Iterable[str]) -> list[Fit]:
     """The built-in sets compared with names, the one that explains most of them first, of equals the one with fewest
     markers that are not there; ``-all`` variants, which are for who asks for them, are left away."""
     own = tuple(recorded)
-    spelt, on_skin = Spellings.of(own), worn(told.place for name in own if (told := said(name)) is not None)
+    spelt, on_skin = Spellings.of(own), worn(told.place for told in said_together(own).values())
     found = []
     for name in available_marker_sets():
         if name.endswith("-all"):

@@ -9,27 +9,8 @@ from dataclasses import dataclass, field, replace
 
 from dynakin.errors import ModelError
 from dynakin.model.markers.schema import Marker, MarkerSetFile
+from dynakin.model.markers.sides import SIDE_WORDS, SideLetters, side_letters, words_of
 from dynakin.recordings.landmarks import FacingPairs, plain_name
-
-# fmt: off
-LONG_SIDE_WORDS = {
-    "right": (
-        "right", "rechts", "derecha", "derecho", "rechter", "direita", "direito", "droite", "droit",
-        "destro", "destra", "rt", "dx", "r",
-    ),
-    "left": (
-        "left", "links", "izquierda", "izquierdo", "linker", "esquerda", "esquerdo", "gauche", "sinistro",
-        "sinistra", "lt", "sx", "l",
-    ),
-}
-# fmt: on
-"""Words for right and left in several languages."""
-SHORT_SIDE_WORDS = {"right": ("re", "d"), "left": ("li", "g")}
-"""German and French: only where nothing else says the side, and a letter only behind a place or a French segment: d
-elsewhere counts the markers of a cluster."""
-SIDE_WORDS = frozenset(word for words in (LONG_SIDE_WORDS, SHORT_SIDE_WORDS) for own in words.values() for word in own)
-"""Words for right and left in all languages that names are read in."""
-
 
 MarkerKey = tuple[str, str]
 """(name of the marker in its set, "right", "left" or "centre")."""
@@ -37,7 +18,6 @@ MarkerKey = tuple[str, str]
 SIDES = ("right", "left", "centre")
 _SIDE_WORDS = {"r": "right", "right": "right", "l": "left", "left": "left"}
 _SEPARATORS = re.compile(r"[\s._\-()]+")
-_WORDS = re.compile(r"[\s._\-()]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 _UNLABELLED = re.compile(r"(?:\*|(?:unlabel|uname|unnamed|unidentified)).*", re.IGNORECASE)
 _FEWEST_OF_A_PERSON = 3  # names behind a prefix by which it counts as a person's
 
@@ -203,9 +183,11 @@ class Spellings:
         """Looks at the names together: a prefix that all share is none of their own."""
         plain: dict[str, list[str]] = defaultdict(list)
         of_side: dict[tuple[str, str], list[str]] = defaultdict(list)
-        for name, own in without_prefix(tuple(names)).items():
+        proper = without_prefix(tuple(names))
+        letters = side_letters(proper)
+        for name, own in proper.items():
             plain[plain_name(own)].append(name)
-            side, rest = _side_and_rest(own)
+            side, rest = _side_and_rest(letters.english.get(name, own) if letters else own)
             if side:
                 of_side[side, rest].append(name)
         return cls(dict(plain), dict(of_side))
@@ -233,8 +215,13 @@ def without_prefix(names: tuple[str, ...]) -> dict[str, str]:
         words = [word for word in _SEPARATORS.split(shared[:end]) if word]
         if words and words[-1] not in _SIDE_WORDS:
             return {name: word[end:] for name, word in own.items()}
-    persons = _persons(own)
+    persons = {} if side_letters(own) else _persons(own)
     return {name: persons.get(name, word) for name, word in own.items()}
+
+
+def letters_of_sides(names: Iterable[str]) -> SideLetters | None:
+    """The letters of another language by which a recording's names say their side, None where there are none."""
+    return side_letters(without_prefix(tuple(names)))
 
 
 def _persons(own: dict[str, str]) -> dict[str, str]:
@@ -253,7 +240,7 @@ def _persons(own: dict[str, str]) -> dict[str, str]:
 
 
 def _side_and_rest(name: str) -> tuple[str, str]:
-    words = [word for word in _WORDS.split(name) if word]
+    words = words_of(name)
     if len(words) > 1:
         for at, rest in ((0, words[1:]), (-1, words[:-1])):
             side = _SIDE_WORDS.get(words[at].casefold())

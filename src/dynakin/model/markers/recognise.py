@@ -26,10 +26,12 @@ from dynakin.model.markers.marker_set import contents_of, set_of
 from dynakin.model.markers.match import (
     MarkerKey,
     MarkerMatch,
+    letters_of_sides,
     match_markers,
     without_prefix,
 )
 from dynakin.model.markers.schema import MarkerSetFile
+from dynakin.model.markers.sides import other_letter
 from dynakin.model.markers.swaps import Swap, distance_words, find_swaps
 from dynakin.recordings.landmarks import plain_name
 from dynakin.recordings.recording import Recording
@@ -77,6 +79,17 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
         found = checked(recording, match_markers(asked, recording.marker_names, recording.seen, where))
         _refuse_wrong_set(found, where)
         return replace(found, messages=(*found.messages, *half_marked_words(found.match)))
+    found = _unasked(recording, where)
+    _refuse_half(found.match)
+    letters = letters_of_sides(recording.seen_names)
+    if letters is None:
+        return found
+    said = note("marker set", f"{letters.right} is read as right and {letters.left} as left.")
+    return replace(found, messages=(*found.messages, said))
+
+
+def _unasked(recording: Recording, where: str) -> Recognised:
+    """By the built-in set that explains most of the names, or by guesses."""
     ranked = fits(recording.seen_names)
     try:
         usable = usable_of(ranked, where)
@@ -124,6 +137,30 @@ def recognise_standing(static: Recording, recording: Recording, known: Recognise
 
 def _own_names(recording: Recording) -> set[str]:
     return set(map(plain_name, without_prefix(tuple(recording.seen_names)).values()))
+
+
+def _refuse_half(match: MarkerMatch) -> None:
+    """Where one leg is known, and names that differ from its markers' by a letter or word alone are left out.
+
+    Raises:
+        ModelError: names both letters.
+    """
+    sides = {side for _, side in match.names if side != "centre"}
+    if len(sides) != 1:
+        return
+    (side,) = sides
+    proper = without_prefix(match.recorded)
+    used = [proper[name] for (_, own), name in match.names.items() if own == side]
+    known = {*match.names.values()}
+    other = other_letter(used, [own for name, own in proper.items() if name not in known])
+    if other is None:
+        return
+    ours, theirs, names = other
+    raise ModelError(
+        f"{match.where}: {ours} in names is read as {side}, {theirs} is not understood and would leave half of the "
+        f"body out ({', '.join(names[:LISTED])}); expected R and L for right and left, or a set of your own: "
+        "dynakin markers new TRIAL -o my.toml"
+    )
 
 
 def half_marked_words(match: MarkerMatch) -> list[Message]:

@@ -32,8 +32,8 @@ set one alone 2.0, two 6.1; exchanged neighbours on a leg mostly bring 15 and mo
 a foot 5.5."""
 _STILL_WRONG = 4.0  # deviations of a distance
 _ODD = 2.5
-"""Deviations. Chosen on one simulated walk with Oxford feet (1.8 at most, labelled rightly; a trochanter exchanged with a
-thigh's cluster 3.0), judged on two others and on all sets."""
+"""Deviations. Chosen on one simulated walk with Oxford feet (1.8 at most, labelled rightly; a trochanter exchanged with
+a thigh's cluster 3.0), judged on two others and on all sets."""
 _OTHER = {"right": "left", "left": "right"}
 _MOST = 6  # exchanges in one recording
 _GROUPS = (
@@ -152,8 +152,8 @@ def _swaps_throughout(
 
 
 def _odd(now: Deviations, expected: Expected, pairs: Sequence[tuple[int, int]]) -> bool:
-    """Whether markers with a place lie oddly, where they would be exchanged with ones of a cluster: these may lie nearer
-    to any place than whose it is, and many small deviations of one marker are one."""
+    """Whether markers with a place lie oddly, where they would be exchanged with ones of a cluster: these may lie
+    nearer to any place than whose it is, and many small deviations of one marker are one."""
     placed = expected.placed
     alone = [k if placed[k] else m for k, m in pairs if placed[k] != placed[m]]
     return bool(np.all(now.largest[alone] > _ODD))

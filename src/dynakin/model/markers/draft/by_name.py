@@ -14,7 +14,8 @@ from typing import Any, Literal
 from dynakin.errors import ModelError
 from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
-from dynakin.model.markers.match import LONG_SIDE_WORDS, SHORT_SIDE_WORDS
+from dynakin.model.markers.match import letters_of_sides
+from dynakin.model.markers.sides import LONG_SIDE_WORDS, SHORT_SIDE_WORDS
 from dynakin.recordings.landmarks import plain_name
 from dynakin.settings.strict import read_toml
 
@@ -117,7 +118,10 @@ def said_together(names: Iterable[str]) -> dict[str, Said]:
     Beside markers on the pelvis' skin (`worn`), names that markerless systems give to joint centres (RKnee) are those
     of markers on the skin; a hip's may be anywhere between trochanter and crest.
     """
-    found = {name: own for name in names if (own := said(name)) is not None}
+    own_names = tuple(names)
+    letters = letters_of_sides(own_names)
+    read = {name: letters.english.get(name, name) if letters else name for name in own_names}
+    found = {name: own for name in own_names if (own := said(read[name])) is not None}
     if not worn(own.place for own in found.values()):
         return found
     skin = {name: replace(own, place=_SKIN_OVER.get(own.place or "", own.place)) for name, own in found.items()}
