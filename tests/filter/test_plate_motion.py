@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,6 +17,7 @@ from dynakin import Estimator, Subject, load_model
 from dynakin.cli.check_rows import model_rows
 from dynakin.errors import RecordingError
 from dynakin.filter.ground import axes
+from dynakin.filter.ground.carried import _taken_up, more_than_the_mass
 from dynakin.filter.ground.coarse_delay import plates_delay
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.fine_delay import UNKNOWN_S
@@ -299,6 +301,19 @@ def test_what_plates_carry_beyond_the_mass_may_be_in_the_hands(times: float) -> 
     assert [message.level for message in said] == (["note"] if times == 1.04 else [])  # at 1.08 the mass is doubted
     rows = [text for title, text in model_rows(ready, Settings(), None) if title == "Results"]
     assert all(message.text in rows for message in said)
+
+
+def test_a_model_without_hands_holds_nothing_in_them() -> None:
+    ready = person().prepare(simulate("fullbody", "squat", 7, 5.0).recording).calibrated
+    assert more_than_the_mass(ready, 1.04) > 2.0
+    spec = copy(ready.spec)
+    spec.segments = [segment for segment in spec.segments if not segment.name.startswith("hand_")]
+    assert more_than_the_mass(replace(ready, spec=spec), 1.04) == 0.0
+
+
+def test_a_load_is_looked_for_in_an_hour_as_in_a_minute() -> None:
+    excess = np.where(np.arange(360_000) < 90_000, 0.0, 40.0)
+    assert _taken_up(excess, 100.0) == pytest.approx(40.0 / GRAVITY_M_S2, rel=0.02)
 
 
 def test_deviations_hold_what_the_hands_may_hold_and_nothing_is_absent_by_it() -> None:

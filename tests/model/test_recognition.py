@@ -19,6 +19,7 @@ from dynakin.model.markers.fit import choose_marker_set
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import MarkerMatch, match_markers
 from dynakin.model.markers.recognise import Recognised, _without_swap, recognise, recognise_standing
+from dynakin.model.markers.sides import other_letter, side_letters
 from dynakin.model.markers.swaps import Swap
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import FacingPairs
@@ -521,6 +522,27 @@ def test_letters_that_count_a_cluster_are_no_language() -> None:
     found = recognise(replace(leg, marker_names=names, markers=markers))
     assert {side for _, side in found.match.names} == {"right", "left"}
     assert not any("is read as right" in m.text for m in found.messages)
+
+
+STEMS = ("ASI", "PSI", "KNE", "ANK", "HEE", "TOE", "TIB")
+
+
+@pytest.mark.parametrize(
+    ("names", "read"),
+    [
+        ([f"{place}_{side}" for place in STEMS for side in "DI"], True),
+        ([*(f"{place}_{side}" for place in STEMS for side in "DI"), *(f"U{k}" for k in range(100, 140))], True),
+        ([f"R{part}{end}" for part in ("TH", "SK", "FT", "PV") for end in "DL"], False),  # distal and lateral, of R
+        ([f"{letter}{k}" for k in range(1, 9) for letter in "DL"], False),  # numbers
+    ],
+)
+def test_which_names_say_their_side_in_another_language(names: list[str], read: bool) -> None:
+    assert (side_letters({name: name for name in names}) is not None) == read
+
+
+def test_only_a_letter_that_says_a_side_is_half_of_two() -> None:
+    assert other_letter(["RTHI1", "RTIB1", "RFOO1"], ["RTHI2", "RTIB2", "RFOO2"]) is None
+    assert other_letter(["LASI", "LKNE", "LANK"], ["KASI", "KKNE", "KANK"]) == ("L", "K", ["KANK", "KASI", "KKNE"])
 
 
 def test_two_persons_are_refused() -> None:

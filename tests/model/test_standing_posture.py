@@ -37,6 +37,12 @@ def test_who_stands_with_bent_legs(knee: float, thigh: float, said: str) -> None
     assert said in found.text and found.text.count("--static") == 1
 
 
+def test_a_height_that_is_estimated_from_who_sits_is_said_to_be_short() -> None:
+    for height_m, said in ((1.37, True), (None, False)):
+        (found,) = check_standing(legs(95.0, 85.0), "chair", height_m)
+        assert ("1.37 m" in found.text and "--height" in found.text) == said
+
+
 def held(recording: Recording, frame: int) -> Recording:
     """A second in this posture."""
     noise = 2e-4 * np.random.default_rng(0).normal(size=(100, *recording.markers.shape[1:]))

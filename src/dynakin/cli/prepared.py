@@ -49,7 +49,7 @@ def assumed(ready: Prepared, settings: Settings) -> Rows:
     default = "" if settings.model != Settings().model else " (the default; --model for another)"
     rows: Rows = [("Model", f"{settings.model}{default}.")]
     chosen = [message.text for message in about(messages, "marker set")]
-    rows += [("Markers", text) for text in chosen[:1] or [f"{len(calibrated.spec.markers)} used."]]
+    rows += [("Markers", text) for text in chosen or [f"{len(calibrated.spec.markers)} used."]]
     rows += [("Subject", in_a_row(about(messages, "mass", "height", "sex")))]
     rows += [
         ("Parameters", f"{settings.parameters}: {message.text}") for message in notes_of(about(messages, "identified"))

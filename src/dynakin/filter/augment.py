@@ -53,7 +53,7 @@ def extended(initial: CalibratedModel, noise: Noise, estimate: Collection[Quanti
         bool(seen and value > 0.0) for seen, value in zip(spec.wrench_measured, plate_sd(noise), strict=True)
     ]
     spec.wrench_offset_point = initial.plate_centre
-    spec.wrench_delay = noise.plate_delay_sd_s > 0.0 and not initial.feet  # jerk would take it up: `plate_clock`
+    spec.wrench_delay = noise.plate_delay_sd_s > 0.0 and not initial.feet  # jerk would take it up: `ground.fine_delay`
     spec.contacts = [*initial.feet, *initial.contacts]
     names = list(_core.Model(spec).layout.names)
     first = dict(zip(initial.names, range(len(initial.names)), strict=True))

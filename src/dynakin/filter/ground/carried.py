@@ -10,6 +10,7 @@ from dynakin.arrays import mean_seen
 from dynakin.filter.ground.mass_centre import second_derivative
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_sum import UNSEEN_APART
+from dynakin.filter.in_hands import HANDS
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.units import GRAVITY_M_S2
 
@@ -28,6 +29,7 @@ MORE = 0.02
 """Part of the weight that plates carry beyond the mass from which the hands may hold it: of less, deviations hold what
 it does to L5/S1 (1.2 kg at half a metre are 6 N m). `truth3d`'s 31 trials, which chose it, have up to 0.008; those of
 10 real recordings whose mass was weighed up to 0.006; box and mass of the attack that asked for it 0.041."""
+_EDGES = 600
 _ARMS = ("hand", "forearm", "radius", "ulna")
 """Segments that show where the hands are, the nearest first."""
 
@@ -68,7 +70,7 @@ def _taken_up(excess: Array, rate: float) -> float | None:
     """Mass, kg, that is there for some of the time: the stretch over which the mean of the vertical excess (N,), N,
     differs most from that of the rest."""
     least, n = round(HELD_S * rate), len(excess)
-    edges = np.arange(0, n + 1, max(round(0.1 * rate), 1))
+    edges = np.arange(0, n + 1, max(round(0.1 * rate), n // _EDGES, 1))  # every pair of them is asked
     edges[-1] = n
     first, end = (edges[k] for k in np.triu_indices(len(edges), 1))
     fits = (end - first >= least) & (n - (end - first) >= least)
@@ -89,12 +91,14 @@ def _taken_up(excess: Array, rate: float) -> float | None:
 
 def more_than_the_mass(initial: CalibratedModel, load_ratio: float | None) -> float:
     """Mass, kg, that plates carry beyond the declared one and that the hands may hold; 0 where it is no more than
-    plates and a body that is not marked whole explain.
+    plates and a body that is not marked whole explain, or the model has no hands.
 
     Args:
         load_ratio: as of `Ground`.
     """
-    more = 0.0 if load_ratio is None else load_ratio - 1.0
+    if load_ratio is None or not any(segment.name in HANDS for segment in initial.spec.segments):
+        return 0.0
+    more = load_ratio - 1.0
     usual = MORE + UNSEEN_APART * initial.unseen_kg / initial.weighed_kg
     return more * initial.weighed_kg if more > usual else 0.0
 

@@ -229,8 +229,7 @@ def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unsee
     within = MASS_APART + UNSEEN_APART * unseen_kg / mass_kg
     if load is None or abs(load - mass_kg) <= within * mass_kg:
         return None
-    held = "" if load_ratio is None else ", which their deviations hold"
-    carried = f", or a load is carried (moments of back and arms are wrong by it{held})" if load > mass_kg else ""
+    carried = ", or a load is carried (moments of back and arms are wrong by it)" if load > mass_kg else ""
     return warning(
         "weight",
         f"the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "

@@ -52,11 +52,12 @@ def refuse_moving_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder)
                 )
 
 
-def check_standing(landmarks: Mapping[str, Array], name: str) -> list[Message]:
+def check_standing(landmarks: Mapping[str, Array], name: str, height_m: float | None = None) -> list[Message]:
     """A warning where somebody who holds still does so with bent legs: a squat, or sitting.
 
     Args:
-        landmarks: of the frames on which places are measured, Y up. name: of the recording.
+        landmarks: of the frames on which places are measured, Y up. name: of the recording. height_m: where it is
+            estimated from markers.
     """
     bent: dict[str, float] = {}
     for side, word in (("r", "right"), ("l", "left")):
@@ -70,10 +71,11 @@ def check_standing(landmarks: Mapping[str, Array], name: str) -> list[Message]:
         return []
     of = "against the vertical" if worst.endswith("thigh") else "bent"
     said = f"nobody stands upright in {name}: the {worst} is {bent[worst]:.0f} deg {of}"
+    short = "" if height_m is None else f" So is the height, {height_m:.2f} m, if nobody stands upright: give --height."
     return [
         warning(
             "standing",
-            f"{said}, and places of markers measured there are off where the legs are straight. Give a standing "
+            f"{said}, and places of markers measured there are off where the legs are straight.{short} Give a standing "
             "trial of the person upright with straight knees (--static).",
         )
     ]

@@ -322,7 +322,8 @@ def _landmarks(
         unknown = not_understood(source.match, str(source.recording.path or "TRIAL"))
         raise error.reworded("; ".join([error.message, *reasons]) + ("." + unknown if unknown else "")) from None
     if still.stands:
-        messages += check_standing(found.landmarks, source.recording.name)
+        given = asked.subject.height_m or any(each.subject.get("height_m") for each in asked.recordings)
+        messages += check_standing(found.landmarks, source.recording.name, None if given else finder.height_m)
     supposed = supposed_legs(found, legs, marked.chosen)
     if supposed and not still.stands:
         raise no_legs(supposed, source, asked.static, legs, finder)

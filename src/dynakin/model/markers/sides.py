@@ -41,6 +41,7 @@ _FEWEST = 4
 """Places that both letters have: a pelvis and a leg, and more than the three of a cluster."""
 _MOST = 0.5  # of a recording's names have one of the two letters
 _FEWEST_LEFT_OUT = 3  # names that differ by the same letter from those that are used
+_NUMBERED = re.compile(r"[a-z]{0,2}\d+")  # says no place: U101, D1
 _WORDS = re.compile(r"[\s._\-()]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
@@ -93,7 +94,8 @@ def side_letters(names: Mapping[str, str]) -> SideLetters | None:
         names: as recorded -> without what stands before the name proper.
     """
     rests: dict[tuple[str, str], dict[str, str]] = defaultdict(dict)
-    for name, own in names.items():
+    named = {name: own for name, own in names.items() if not _NUMBERED.fullmatch(plain_name(own))}
+    for name, own in named.items():
         for reading in _readings(own):
             rests[reading.end, reading.word].setdefault(reading.rest, name)
 
@@ -106,7 +108,11 @@ def side_letters(names: Mapping[str, str]) -> SideLetters | None:
     found, end, (right, left) = max(
         ((shared(end, pair), end, pair) for end in ends for pair in _LETTERS), key=lambda each: len(each[0])
     )
-    if len(found) < max(_FEWEST, usual + 1) or 2 * len(found) < _MOST * len(names):
+    if len(found) < max(_FEWEST, usual + 1) or 2 * len(found) < _MOST * len(named):
+        return None
+    other = 0 if end == "last" else -1
+    both = [plain_name(names[rests[end, word][rest]]) for word in (right, left) for rest in found]
+    if all(plain[other] in "rl" for plain in both):  # who says R or L at the other end counts by these
         return None
     english = {
         rests[end, word][rest]: f"{side}_{rest.upper()}" for word, side in ((right, "R"), (left, "L")) for rest in found
@@ -115,7 +121,7 @@ def side_letters(names: Mapping[str, str]) -> SideLetters | None:
 
 
 def other_letter(used: Iterable[str], left_out: Iterable[str]) -> tuple[str, str, list[str]] | None:
-    """A letter or word by which three and more names that are left out differ from such that are used.
+    """A letter or word by which three and more names that are left out differ from such that say a side and are used.
 
     Returns:
         That of the names in use, that of the others, and these; None where there is none.
@@ -127,7 +133,7 @@ def other_letter(used: Iterable[str], left_out: Iterable[str]) -> tuple[str, str
     found: dict[tuple[str, str, str], set[str]] = defaultdict(set)
     for name in left_out:
         for own in _readings(name):
-            for word in at.get((own.end, own.rest), ()):
+            for word in at.get((own.end, own.rest), set()) & SIDE_WORDS:
                 found[own.end, word, own.word].add(name)
     if not found:
         return None
