@@ -30,6 +30,7 @@ MORE = 0.02
 it does to L5/S1 (1.2 kg at half a metre are 6 N m). `truth3d`'s 31 trials, which chose it, have up to 0.008; those of
 10 real recordings whose mass was weighed up to 0.006; box and mass of the attack that asked for it 0.041."""
 _EDGES = 600
+"""Of stretches, at most: each pair of them is asked, of an hour too."""
 _ARMS = ("hand", "forearm", "radius", "ulna")
 """Segments that show where the hands are, the nearest first."""
 
@@ -70,7 +71,7 @@ def _taken_up(excess: Array, rate: float) -> float | None:
     """Mass, kg, that is there for some of the time: the stretch over which the mean of the vertical excess (N,), N,
     differs most from that of the rest."""
     least, n = round(HELD_S * rate), len(excess)
-    edges = np.arange(0, n + 1, max(round(0.1 * rate), n // _EDGES, 1))  # every pair of them is asked
+    edges = np.arange(0, n + 1, max(round(0.1 * rate), n // _EDGES, 1))
     edges[-1] = n
     first, end = (edges[k] for k in np.triu_indices(len(edges), 1))
     fits = (end - first >= least) & (n - (end - first) >= least)

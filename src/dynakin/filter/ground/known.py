@@ -60,7 +60,7 @@ def known_ground(
     ground, known = standing.judged()
     clock = _Clock(coarse, 0.0 if coarse is None else coarse.sd_s, ())
     if ground.loads is not None and ground.loads.on.any():
-        clock, ground, known = _clock(trial, as_it_is, coarse, ground, known)
+        clock, ground, known = _in_step(trial, as_it_is, coarse, ground, known)
     moved = () if clock.taken is None else (_taken_in_words(clock.taken, recording, not initial.unseen_kg),)
     behind_s = 0.0 if clock.taken is None else clock.taken.delay_s
     notes = (*zeros, *moved, *ground.notes, *clock.notes)
@@ -76,7 +76,7 @@ class _Clock(NamedTuple):
     notes: tuple[Message, ...]
 
 
-def _clock(
+def _in_step(
     trial: Trial, as_it_is: Standing, coarse: Delay | None, ground: Ground, known: Array
 ) -> tuple[_Clock, Ground, Array]:
     """How far the plates are out of step, to a millisecond or two where the movement shows it, and what is known of
