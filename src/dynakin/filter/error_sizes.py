@@ -9,6 +9,7 @@ import numpy as np
 
 from dynakin.filter.joint_errors import Kind
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.plan import angles_of
 
 OF_JOINTS = get_args(Kind)
 KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "limbs", "clock", "hands")
@@ -140,5 +141,5 @@ def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:
     """Segment -> how many times as far off the centre of its joint may be as those of others."""
     if calibrated.unmarked_joints:  # all are said to be as unsure
         return {}
-    turns = {f"{joint[:-2]}_angle{joint[-2:]}" for joint in calibrated.one_sided_joints}  # knee_r: knee_angle_r
+    turns = angles_of(calibrated.one_sided_joints)
     return {s.name: ONE_SIDED for s in calibrated.spec.segments if turns & {axis.coordinate for axis in s.axes}}

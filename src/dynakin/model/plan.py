@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,11 @@ SUPPOSED_AXIS = 2.0
 pelvis and the foot, it is 0.08 to 0.30 rad off by the movement in 16 knees of simulated squats, and was held at 0.2,
 four of the usual deviations, in 5 of 8 runs. Chosen on these, of 2 and 3 (knees to 0.59 and 0.57 instead of 0.65 deg),
 judged on ten others."""
+
+
+def angles_of(joints: Iterable[str]) -> set[str]:
+    """The coordinates that flex these joints: of knee_r knee_angle_r."""
+    return {f"{joint[:-2]}_angle{joint[-2:]}" for joint in joints}
 
 
 @dataclass
@@ -86,7 +92,7 @@ class ModelPlan:
     def _length_sd(self) -> dict[str, float]:
         """Of lengths that are known otherwise than to a part of their value."""
         known = {length.name: length.sd_m for length in self.model.lengths if length.sd_m is not None}
-        turns = {f"{joint[:-2]}_angle{joint[-2:]}" for joint in self.supposed_axes}  # knee_r: knee_angle_r
+        turns = angles_of(self.supposed_axes)
         axes = [axis for segment in self.model.segments for axis in segment.axes if axis.coordinate in turns]
         turned = {axis.scale for axis in axes if axis.kind == "rotation"}
         return {name: SUPPOSED_AXIS * sd if name in turned else sd for name, sd in known.items()}

@@ -39,10 +39,9 @@ MODEL_S = 0.002
 """What joints, skin and segments that are not rigid do besides: by `truth3d`'s walks 0.3 to 1.3 ms."""
 MODEL_LEGS_S = 0.005
 """The same of a body that is not marked whole, of which the vertical force alone is asked (an unseen trunk leans, and
-goes up and down with the pelvis). Chosen on `truth3d`'s seeds 1 to 4
-without their upper bodies' markers, whose plates are 2 ms late: 5.2 to 7.9 found in walks, -0.9 to 8.5 in squats, 1.6
-deviations at most. 3.7 to 9.8 and -2.2 to 7.3 in seeds 61 to 64, real ones within 1.6 deviations (`walking1` 12.6 and
-of the whole body 5)."""
+goes up and down with the pelvis). Chosen on `truth3d`'s seeds 1 to 4 without their upper bodies' markers, whose plates
+are 2 ms late: 5.2 to 7.9 found in walks, -0.9 to 8.5 in squats, 1.6 deviations at most (`delay.LEGS_SD`). 3.7 to 9.8
+and -2.2 to 7.3 in seeds 61 to 64, real ones within 1.6 deviations (`walking1` 12.6 and of the whole body 5)."""
 UNKNOWN_S = 0.005
 """How far out of step plates may be where nothing judges it: most are 2 ms, some 20. `truth3d`'s walks over one plate
 (seeds 1, 2), 2 ms late, have deviations 1.1 to 1.8 times their errors with 5 and with 8 ms, and an .osim's ankle 3.1

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -77,7 +77,8 @@ class Ground:
     in_hands_kg: float = 0.0
 
 
-class Trial(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Trial:
     """What is judged: markers (T, M, 3) m, of the model, ground frame; assigned, tolerance: as for `known_ground`."""
 
     recording: Recording
@@ -86,7 +87,7 @@ class Trial(NamedTuple):
     assigned: Mapping[str, str] | None
     tolerance: float | None
 
-    @property
+    @cached_property
     def wrench(self) -> Array:
         """(T, 6) N and N m of all plates, ground frame; NaN where one of them is not measured."""
         if not self.recording.plates:
@@ -94,18 +95,18 @@ class Trial(NamedTuple):
         total = self.initial.ground.wrench_to_ground(self.recording.total_wrench())
         return np.where(np.isfinite(total).all(axis=1, keepdims=True), total, np.nan)
 
-    @property
+    @cached_property
     def wrenches(self) -> Array:
         """(P, T, 6) of each plate."""
         return np.stack([self.initial.ground.wrench_to_ground(plate.wrench) for plate in self.recording.plates])
 
     def in_step(self, delay: Delay) -> Trial:
         """The same of what the plates say so much later."""
-        return self._replace(recording=brought_into_step(self.recording, delay))
+        return replace(self, recording=brought_into_step(self.recording, delay))
 
     def without_plates(self) -> Trial:
         """The same of the markers alone."""
-        return self._replace(recording=self.recording.with_plates(()), assigned=None)
+        return replace(self, recording=self.recording.with_plates(()), assigned=None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +143,7 @@ class Standing:
         taken = None if loads is None else plate_of_its_own(recording, initial, loads, paths, may)
         if taken is not None:
             own = {**(trial.assigned or {}), taken: next(iter(initial.contacts))}
-            loads = _loads_of_feet(trial._replace(assigned=own))
+            loads = _loads_of_feet(replace(trial, assigned=own))
         by_plate = [loads is not None and name in loads.others for name in initial.contacts]
         may &= ~np.array(by_plate, dtype=bool)
         found = Standing(trial, loads, may, by_plate, taken, None, NO_SHEAR, None)

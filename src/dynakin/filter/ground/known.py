@@ -134,7 +134,7 @@ def _zeroed(trial: Trial) -> tuple[Trial, list[Message]]:
     recording, said = without_offsets(trial.recording, initial.ground, initial.markers_on_feet)
     if recording is trial.recording:
         return trial, said
-    zeroed = trial._replace(recording=recording)
+    zeroed = replace(trial, recording=recording)
     before, after = (abs(_median_load(each) / (initial.weighed_kg * GRAVITY_M_S2) - 1.0) for each in (trial, zeroed))
     bears = before < MASS_APART and after - before > SUPPORT
     return (trial, []) if bears else (zeroed, said)
