@@ -665,7 +665,7 @@ def test_a_load_in_the_hands_counts_in_the_moments_that_bear_it() -> None:
         laden = with_loads(person, [CarriedLoad(segment=hand, mass_kg=1.0, place_m=place)])
         square += 0.5 * np.square(_core.joint_moments(_core.Model(laden.spec), x, np.zeros((len(own) + 1, 6))) - free)
     coordinates = [c.name for c in person.spec.coordinates]
-    borne = Hands(person.spec).variances(x, len(coordinates))
+    borne = Hands(person.spec, _core.Model(person.spec)).variances(x, len(coordinates))
     inner = [k for k, name in enumerate(coordinates) if not name.startswith("pelvis")]
     np.testing.assert_allclose(borne[inner], square[inner], atol=1e-9)
     elbow, knee = (coordinates.index(name) for name in ("elbow_flex_r", "knee_angle_r"))

@@ -15,11 +15,11 @@ HANDS = ("hand_r", "hand_l")
 
 
 class Hands:
-    """Where a model can hold something: in the middle of each of its hands, as far as it has any."""
+    """Where a model, of this spec, can hold something: in the middle of each of its hands, as far as it has any."""
 
-    def __init__(self, spec: _core.ModelSpec) -> None:
+    def __init__(self, spec: _core.ModelSpec, model: _core.Model) -> None:
         names = [segment.name for segment in spec.segments]
-        self._model = _core.Model(spec)
+        self._model = model
         self._at = [names.index(name) for name in HANDS if name in names]
         inertia = [np.asarray(spec.segments[k].inertia, dtype=float) for k in self._at]
         self._centres = [own[1:4] / own[0] if own[0] > 0.0 else np.zeros(3) for own in inertia]

@@ -93,7 +93,8 @@ class Systematic:
         self._R0 = _core.segment_poses(self._errors.model, x)[0]
         self._D0 = self._displacements(_core.marker_jacobian(self._errors.model, x))
         self._D0[:, [kind == "root" for kind in self._errors.kinds]] = 0.0
-        self._model, self._hands = _core.Model(spec), Hands(spec)
+        self._model = _core.Model(spec)
+        self._hands = Hands(spec, self._model)
         self._constants = np.array(calibrated.x0)
         self._rolls = [first[name] for name in rolls(spec) if name in first]
         gain, N = self._gain(x)

@@ -36,8 +36,6 @@ ASIDE, ACROSS, ACROSS_SLOPE = 0.04, -0.5, -0.2
 """Across it, the mean with it (the ground pushes a foot inwards): correlation and slope of an axis that is reversed,
 where feet lie so far aside (RMS of the lean; a run's 0.01 to 0.03 show nothing). On those plates 0.01 to 0.97 and 0.01
 to 0.8."""
-
-
 BESIDE_M = 0.03
 """How far the mean of the pelvis' markers may lie beside its middle: three quarters of `ASIDE` under a centre of mass
 1 m up. Those of one side (0.09 to 0.13 m) make a body lean over that foot as it does over neither."""
