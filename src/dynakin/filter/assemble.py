@@ -13,6 +13,7 @@ from dynakin.bindings import _core
 from dynakin.filter.augment import variance_scales
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
+from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.impossible import impossible, impossible_in_words
 from dynakin.filter.labels import labels
 from dynakin.filter.noise import limit_sd, prior_factor
@@ -20,7 +21,7 @@ from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import hidden_segments, with_sources
 from dynakin.filter.systematic import Systematic
 from dynakin.filter.taken import with_taken
-from dynakin.messages import Message, about, note, warning, warnings_of
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import ON_PLATE, UNMEASURED
@@ -97,7 +98,7 @@ def assemble(
         initial.unmarked_feet.values(),
         hidden_segments(initial.spec, measured[0], recording.time),
         beyond,
-        bool(warnings_of(about(notes, "carried"))),
+        says_carried(notes),
     )
     if feet is not None:
         _widen_priors(data, prior_factor(used), feet.blind)

@@ -9,11 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
+from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.labels import labels
 from dynakin.filter.sources import ContactSources, hidden_segments
 from dynakin.filter.tracker import Tracker
-from dynakin.messages import Message, about, warnings_of
+from dynakin.messages import Message
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, source_figures
@@ -71,7 +72,7 @@ class Prepared:
 
         calibrated = self.calibrated
         known = ContactSources.of(calibrated)
-        sources = known.moments(self.contacts, carried=bool(warnings_of(about(self.ground.notes, "carried"))))
+        sources = known.moments(self.contacts, carried=says_carried(self.ground.notes))
         if self.contacts is None:
             blind = np.isnan(self.wrench).all(axis=1)
             codes = np.where(self.ground.undeclared, ABSENT, np.where(blind, DERIVED, MEASURED))

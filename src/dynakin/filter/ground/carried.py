@@ -3,6 +3,8 @@ comes and stays; or there is more on the plates than the mass all the time, and 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -11,6 +13,7 @@ from dynakin.filter.ground.mass_centre import second_derivative
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_sum import UNSEEN_APART
 from dynakin.filter.in_hands import HANDS
+from dynakin.messages import Message, about, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.units import GRAVITY_M_S2
 
@@ -119,3 +122,8 @@ def carried_in_words(carried_kg: float) -> str:
         f"the plates' force changes as if about {carried_kg:.0f} kg were carried in the hands, which the model does "
         "not have: moments of shoulders, elbows and back are wrong by that and not given, those of hips are less sure."
     )
+
+
+def says_carried(notes: Iterable[Message]) -> bool:
+    """Whether it is among what there is to say, so that what bears the load is wrong by it."""
+    return bool(warnings_of(about(notes, "carried")))

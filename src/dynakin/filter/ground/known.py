@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in_words, out_of_step_in_words
 from dynakin.filter.ground.fine_delay import UNKNOWN_S, clock_delay
 from dynakin.filter.ground.judged import Ground, Standing, Trial
 from dynakin.filter.ground.plate_sum import MASS_APART
-from dynakin.messages import Message, about, note, warning, warnings_of
+from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.zero_offset import without_offsets
 from dynakin.recordings.recording import Recording
@@ -60,7 +61,7 @@ def known_ground(
     ground, known = standing.judged()
     clock = _Clock(coarse, 0.0 if coarse is None else coarse.sd_s, ())
     if ground.loads is not None and ground.loads.on.any():
-        clock, ground, known = _in_step(trial, as_it_is, coarse, ground, known)
+        clock, ground, known = _in_step(as_it_is, coarse, standing, ground, known)
     moved = () if clock.taken is None else (_taken_in_words(clock.taken, recording, not initial.unseen_kg),)
     behind_s = 0.0 if clock.taken is None else clock.taken.delay_s
     notes = (*zeros, *moved, *ground.notes, *clock.notes)
@@ -77,23 +78,24 @@ class _Clock(NamedTuple):
 
 
 def _in_step(
-    trial: Trial, as_it_is: Standing, coarse: Delay | None, ground: Ground, known: Array
+    as_it_is: Standing, coarse: Delay | None, standing: Standing, ground: Ground, known: Array
 ) -> tuple[_Clock, Ground, Array]:
     """How far the plates are out of step, to a millisecond or two where the movement shows it, and what is known of
     the ground once they are not.
 
     Args:
-        coarse: the delay that ``ground`` and ``known`` (T, 6) are without.
+        coarse: the delay that ``standing``, and what was judged of it (``ground``, ``known`` (T, 6)), are without.
     """
-    initial, time = trial.initial, trial.recording.time
+    trial, initial = as_it_is.trial, as_it_is.trial.initial
     whole, fine, left = not initial.unseen_kg, None, None
     for _ in range(ROUNDS):
-        plates = trial.in_step(fine or coarse or IN_STEP).wrenches
-        left = clock_delay(initial, time, trial.markers, known, not warnings_of(about(ground.notes, "carried")), plates)
+        plates = standing.trial.wrenches
+        left = clock_delay(initial, trial.recording.time, trial.markers, known, not says_carried(ground.notes), plates)
         if left is None or not left.worth_it(whole or coarse is not None or fine is not None):
             break
         fine = left.after(fine or coarse or IN_STEP)
-        ground, known = Standing.of(trial.in_step(fine)).judged()
+        standing = Standing.of(trial.in_step(fine))
+        ground, known = standing.judged()
         if whole and not left.apart:
             break
     if fine is not None and fine.worth_it(whole):

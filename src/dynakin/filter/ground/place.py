@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.limbs import unseen_limbs
 from dynakin.messages import Message, about, warning
@@ -40,7 +41,7 @@ def off_place(
         states: (T, n). measured: (T, 6) total wrench by the plates. names: of the plates.
     """
     loads, weight = ground.loads, initial.weighed_kg * GRAVITY_M_S2
-    if loads is None or not names or initial.contacts or about(ground.notes, "rate", "carried"):
+    if loads is None or not names or initial.contacts or about(ground.notes, "rate") or says_carried(ground.notes):
         return None
     limbs = sum(sum(limb.values()) for limb in unseen_limbs(initial))
     limit = OFF_PLACE_M + (OFF_UNSEEN_M * initial.unseen_kg + limbs) / initial.weighed_kg
