@@ -19,14 +19,14 @@ import numpy as np
 from pages import put
 
 from dynakin.errors import DynakinError
-from dynakin.filter.adapt import Flags, Trial, calibrated_noise, nis_per_row
+from dynakin.filter.adapt import Flags, Samples, calibrated_noise, nis_per_row
 from dynakin.filter.alignment import run_in_step
 from dynakin.filter.tracker import Tracker
 from dynakin.settings.noise import JointGroup
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import case_of
 from recordings import DATA, ROOT, TRIALS, Array
-from recordings import Trial as Known
+from recordings import Samples as Known
 
 KEPT = ROOT / "build" / "nis"
 LONGEST_S = 20.0
@@ -96,7 +96,7 @@ def figures(trial: Known, wanted: str) -> dict[str, Any]:
         ready.tracker.fresh(), recording.time, ready.markers, ready.wrench, None, ready.contacts
     )
     contacts = ready.contacts and ready.contacts.in_step(recording.time, shift)
-    run = Trial(recording.time, ready.markers, ready.wrench, contacts)
+    run = Samples(recording.time, ready.markers, ready.wrench, contacts)
     chosen = halves(run.time)
     noise = calibrated_noise(tracker, arrays, run, chosen)
     if noise is None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.filter.adapt import LATE_SHARE, LEAST_FRAMES, Trial, calibrated_noise, frames_that_show, nis_per_row
+from dynakin.filter.adapt import LATE_SHARE, LEAST_FRAMES, Samples, calibrated_noise, frames_that_show, nis_per_row
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.noise import joint_groups
@@ -39,7 +39,7 @@ def planar(noise: Noise) -> Estimator:
 
 def found(ready: Prepared, frames: np.ndarray | None = None) -> tuple[Noise, dict[str, np.ndarray]]:
     tracker = ready.tracker.fresh()
-    trial = Trial(ready.recording.time, ready.markers, ready.wrench, ready.contacts)
+    trial = Samples(ready.recording.time, ready.markers, ready.wrench, ready.contacts)
     arrays = tracker.run_arrays(*trial[:3], None, trial.contacts)
     noise = calibrated_noise(tracker, arrays, trial, frames)
     assert noise is not None
@@ -159,7 +159,7 @@ def test_frames_in_which_limbs_are_astray_say_nothing_of_the_noise() -> None:
     """More than a third of the markers refused is a lost frame: of some the rest is as before, of most nothing is."""
     ready = planar(Noise()).prepare(standing(0.001))
     tracker = ready.tracker.fresh()
-    trial = Trial(ready.recording.time, ready.markers, ready.wrench, ready.contacts)
+    trial = Samples(ready.recording.time, ready.markers, ready.wrench, ready.contacts)
     arrays = tracker.run_arrays(*trial[:3], None, trial.contacts)
     for share, kept in ((0.3, True), (0.7, False)):
         astray = np.arange(len(trial.time)) >= (1.0 - share) * len(trial.time)

@@ -13,7 +13,7 @@ import pytest
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.joint_motion import JointMotion, angle_deg, joint_axis, joint_centre, rigid_motion
 from dynakin.model.calibration.landmarks import LandmarkFinder
@@ -88,7 +88,7 @@ def test_a_regression_that_is_off_is_replaced() -> None:
         hip, centre, _ = functional_trial(seed, "hip", noise)
         match = match_markers(load_marker_set("opencap"), hip.marker_names, [True] * len(hip.marker_names), hip.name)
         ground = find_laboratory_frame(hip, vertical="auto", forward="auto", pairs=match.facing_pairs)
-        trial = Trial.of(hip, match, ground).facing()
+        trial = MarkedTrial.of(hip, match, ground).facing()
         finder = LandmarkFinder(match, "both", "male", planar=False, in_space=True, height_m=1.75)
         before = finder.find_in_space(trial.median(STANDING))
         after, said = functional_landmarks({"hip_r": hip}, before, finder, trial, STANDING)

@@ -10,7 +10,7 @@ import pytest
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import find_height
-from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.definition import load_model
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
@@ -197,7 +197,7 @@ def test_a_height_is_taken_from_one_frame_with_a_foot_on_the_ground() -> None:
     recording = make(frames)
     match = match_markers(load_marker_set("opencap"), recording.marker_names, [True] * len(places), "made")
     ground = find_ground_frame(recording, vertical="+Y", forward="+X")
-    height, _ = find_height(Subject(), [recording], Trial.of(recording, match, ground))
+    height, _ = find_height(Subject(), [recording], MarkedTrial.of(recording, match, ground))
     assert height == pytest.approx((places["R_Shoulder"][1] - lowest) / 0.818, abs=1e-9)
 
 

@@ -11,7 +11,7 @@ from dynakin.messages import note
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import repetitions_of
-from dynakin.validation.methods import Method, Trial
+from dynakin.validation.methods import ComparedTrial, Method
 from support.estimates.synthetic import SEGMENTS
 
 JOINTS = ("toe", "ankle", "knee", "hip", "lumbar", "shoulder", "elbow")
@@ -36,19 +36,19 @@ def with_joints(estimate: Estimate) -> Estimate:
 
 
 @pytest.fixture(scope="session")
-def comparison(jointed: Estimate) -> Trial:
+def comparison(jointed: Estimate) -> ComparedTrial:
     """The jointed estimate beside made references: five degrees, 10 N m of moment and 20 of each wrench component
     off."""
     return made_comparison(jointed)
 
 
-def made_comparison(estimate: Estimate) -> Trial:
+def made_comparison(estimate: Estimate) -> ComparedTrial:
     data = estimate.data
     measured = data["markers_measured"].values
     arrays = (data["coordinates"].values, data["moments"].values, data["markers_estimated"].values)
     wrench = np.where(np.isfinite(data["wrench_estimated"].values), data["wrench_measured"].values + 20.0, np.nan)
     shifted = (arrays[0] + np.radians(5.0), arrays[1] + 10.0, measured + 0.01, wrench)
-    return Trial(
+    return ComparedTrial(
         name=estimate.recording.name,
         time=estimate.time,
         window=evaluation_window(estimate.time),

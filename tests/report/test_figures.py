@@ -15,7 +15,7 @@ from dynakin.report.paper_figures.figures import FIGURES, save_figures
 from dynakin.report.paper_figures.movement import middle_cycle
 from dynakin.report.paper_figures.parameters import spread
 from dynakin.results.estimate import Estimate
-from dynakin.validation.methods import Trial
+from dynakin.validation.methods import ComparedTrial
 
 
 def words_in(path: Path) -> str:
@@ -23,7 +23,7 @@ def words_in(path: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def saved(jointed: Estimate, comparison: Trial, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def saved(jointed: Estimate, comparison: ComparedTrial, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("figures")
     written = save_figures(jointed, folder, ("svg",), comparison=comparison)
     assert [path.stem for path in written] == list(FIGURES)
@@ -66,7 +66,7 @@ def test_formats_and_what_is_left_out(jointed: Estimate, tmp_path: Path) -> None
     assert written[0].read_bytes()[:4] == b"%PDF"
 
 
-def test_wrong_requests_are_refused(jointed: Estimate, comparison: Trial, tmp_path: Path) -> None:
+def test_wrong_requests_are_refused(jointed: Estimate, comparison: ComparedTrial, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="'jpg' is not known, expected some of svg, pdf, png"):
         save_figures(jointed, tmp_path, ("jpg",))
     with pytest.raises(ConfigError, match="comparison has 100 frames, expected the estimate's 1201"):
@@ -76,14 +76,14 @@ def test_wrong_requests_are_refused(jointed: Estimate, comparison: Trial, tmp_pa
         save_figures(jointed, tmp_path / "file", ("svg",))
 
 
-def test_same_estimate_same_files(jointed: Estimate, saved: Path, tmp_path: Path, comparison: Trial) -> None:
+def test_same_estimate_same_files(jointed: Estimate, saved: Path, tmp_path: Path, comparison: ComparedTrial) -> None:
     save_figures(jointed, tmp_path, ("svg",), comparison=comparison)
     for name in ("figure4_markers.svg", "figure8_lengths_and_masses.svg"):
         assert (tmp_path / name).read_bytes() == (saved / name).read_bytes()
 
 
 def test_several_processes_write_the_same_files(
-    jointed: Estimate, comparison: Trial, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    jointed: Estimate, comparison: ComparedTrial, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folders = {cores: tmp_path / str(cores) for cores in (1, 3)}
     for cores, folder in folders.items():

@@ -28,7 +28,7 @@ from dynakin.results.measures.mean_curves import mean_curves, signals
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.repetitions import Found, Repetition
 from dynakin.results.measures.sources import ABSENT, DERIVED, PRIOR, measured_moments
-from dynakin.validation.methods import Trial
+from dynakin.validation.methods import ComparedTrial
 from support.estimates.walking import make_walker
 from support.page import shown, unpacked
 
@@ -215,7 +215,7 @@ def test_planar_panels_dash_what_is_derived_and_leave_out_what_is_absent(estimat
 
 
 def test_moments_by_method_are_compared_where_measured_and_dashed_elsewhere(
-    jointed: Estimate, comparison: Trial
+    jointed: Estimate, comparison: ComparedTrial
 ) -> None:
     derived = with_source(jointed, DERIVED, slice(0, 600))
     data = derived.data.copy(deep=True)

@@ -14,7 +14,7 @@ from dynakin.report.page import render_report
 from dynakin.report.text_tables import table2_text, unseen_text
 from dynakin.results.estimate import Estimate
 from dynakin.validation.differences import angle_differences, moment_differences
-from dynakin.validation.methods import Trial
+from dynakin.validation.methods import ComparedTrial
 from dynakin.validation.table2 import Spread, table2
 from dynakin.validation.unseen import UnseenRow
 from support.page import Structure
@@ -23,16 +23,16 @@ SETTINGS = [{"model": "sagittal7", "presets": {"paper": {"force_variance_n2": 0.
 
 
 @pytest.fixture(scope="module")
-def run_page(jointed: Estimate, comparison: Trial) -> str:
+def run_page(jointed: Estimate, comparison: ComparedTrial) -> str:
     return render_report(jointed, comparison=comparison)
 
 
 @pytest.fixture(scope="module")
-def page(comparison: Trial) -> str:
+def page(comparison: ComparedTrial) -> str:
     return render_comparison([comparison], tables(comparison), SETTINGS, ["squat"])
 
 
-def tables(trial: Trial) -> dict[str, list[object]]:
+def tables(trial: ComparedTrial) -> dict[str, list[object]]:
     found: dict[str, list[object]] = {
         "table2": list(table2([trial])),
         "angles": list(angle_differences([trial])),
@@ -48,7 +48,9 @@ def part(html: str, anchor: str) -> str:
     return " ".join(text.split())
 
 
-def test_the_runs_page_shows_table_ii_angles_wrench_and_knee_moment_by_method(run_page: str, comparison: Trial) -> None:
+def test_the_runs_page_shows_table_ii_angles_wrench_and_knee_moment_by_method(
+    run_page: str, comparison: ComparedTrial
+) -> None:
     text = part(run_page, "methods")
     row = {(row.quantity, row.method): row for row in table2([comparison])}["fy", "AT (6 Hz)"]
     assert row.rms.mean == pytest.approx(20.0)
@@ -69,7 +71,7 @@ def test_pages_are_whole_and_need_no_other_file(which: str, request: pytest.Fixt
     assert used <= set(structure.ids) and "url(http" not in html and "<script src" not in html
 
 
-def test_without_reference_methods_the_page_says_why_in_a_line(jointed: Estimate, comparison: Trial) -> None:
+def test_without_reference_methods_the_page_says_why_in_a_line(jointed: Estimate, comparison: ComparedTrial) -> None:
     alone = replace(
         comparison,
         methods=comparison.methods[:1],
@@ -94,7 +96,7 @@ def test_comparison_page_holds_its_tables_and_settings(page: str) -> None:
     assert "20 N by AT (6 Hz)" in part(page, "summary")
 
 
-def test_a_filter_worse_than_persistence_is_marked(comparison: Trial) -> None:
+def test_a_filter_worse_than_persistence_is_marked(comparison: ComparedTrial) -> None:
     rows = [
         UnseenRow("100 ms ahead", "fy", "N", method, Spread(value, None, 1))
         for method, value in (("EKF (paper)", 400.0), ("persistence", 50.0), ("linear extrapolation", 45.0))
@@ -105,7 +107,7 @@ def test_a_filter_worse_than_persistence_is_marked(comparison: Trial) -> None:
     assert 'class="warning"' in html and "400.0 N" in part(html, "unseen")
 
 
-def test_many_trials_give_their_spread_and_their_own_repetitions(comparison: Trial) -> None:
+def test_many_trials_give_their_spread_and_their_own_repetitions(comparison: ComparedTrial) -> None:
     other = replace(comparison, name="second", measured_wrench=comparison.measured_wrench + 10.0)
     both = [comparison, other]
     made = {"table2": table2(both), "angles": angle_differences(both), "moments": moment_differences(both)}
@@ -117,13 +119,13 @@ def test_many_trials_give_their_spread_and_their_own_repetitions(comparison: Tri
     assert len(set(structure.ids)) == len(structure.ids)
 
 
-def test_parameters_judged_alone_make_a_page_too(comparison: Trial) -> None:
+def test_parameters_judged_alone_make_a_page_too(comparison: ComparedTrial) -> None:
     rows = [row for row in table2([comparison]) if row.quantity == "fy"]
     html = render_comparison([], {"held_out": rows}, SETTINGS * 2, ["A", "B"], [note("method", "B: a note")])
     assert "<h1>A → B</h1>" in html and "20.0 N" in part(html, "held-out") and "B: a note" in part(html, "details")
 
 
-def test_tables_have_a_cell_for_each_heading(comparison: Trial) -> None:
+def test_tables_have_a_cell_for_each_heading(comparison: ComparedTrial) -> None:
     rows = table2([comparison])
     for table in (table2_text(rows, "t"), table2_text(rows, "t", single_markers=True)):
         assert table.rows and {len(row) for row in table.rows} == {len(table.headings)}

@@ -9,7 +9,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.case import Setup
-from dynakin.validation.methods import Trial, compare_trial
+from dynakin.validation.methods import ComparedTrial, compare_trial
 
 
 @pytest.fixture(scope="session")
@@ -24,5 +24,5 @@ def setup() -> Setup:
 
 
 @pytest.fixture(scope="session")
-def compared(simulated: SimulatedTrial, setup: Setup) -> Trial:
+def compared(simulated: SimulatedTrial, setup: Setup) -> ComparedTrial:
     return compare_trial(simulated.recording, setup)

@@ -19,7 +19,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.validation.case import Setup
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.files import save_comparison
-from dynakin.validation.methods import Trial, compare_trial
+from dynakin.validation.methods import ComparedTrial, compare_trial
 from dynakin.validation.table2 import Spread, marker_fit, spread, table2, table2_of
 
 IN_PLANE = np.array([True, True, False])
@@ -50,7 +50,7 @@ def test_mean_and_sample_deviation_over_the_trials_that_have_a_figure() -> None:
     assert spread([None]) == Spread(None, None, 0)
 
 
-def test_rows_are_recomputable_from_the_estimate_after_the_adaptation(compared: Trial) -> None:
+def test_rows_are_recomputable_from_the_estimate_after_the_adaptation(compared: ComparedTrial) -> None:
     rows = {(row.quantity, row.method): row for row in table2([compared])}
     metrics = compute_metrics(compared.estimates["default"])
     assert compared.time[compared.window][0] == pytest.approx(2.0)
@@ -62,7 +62,7 @@ def test_rows_are_recomputable_from_the_estimate_after_the_adaptation(compared: 
     assert ("fz", "EKF (default)") not in rows  # a planar model says nothing of it
 
 
-def test_every_method_has_markers_and_wrench_and_the_filter_follows_them_closest(compared: Trial) -> None:
+def test_every_method_has_markers_and_wrench_and_the_filter_follows_them_closest(compared: ComparedTrial) -> None:
     rows = {(row.quantity, row.method): row.rms.mean for row in table2([compared])}
     for quantity in ("markers", "fx", "fy", "mz"):
         ekf, *others = (rows[quantity, name] for name in ("EKF (default)", "AT (6 Hz)", "classical (6 Hz)"))
@@ -70,7 +70,7 @@ def test_every_method_has_markers_and_wrench_and_the_filter_follows_them_closest
         assert all(other is not None and ekf < other for other in others), quantity
 
 
-def test_two_trials_give_their_mean_and_deviation(compared: Trial) -> None:
+def test_two_trials_give_their_mean_and_deviation(compared: ComparedTrial) -> None:
     shifted = replace(compared, measured_wrench=compared.measured_wrench + np.array([0, 30.0, 0, 0, 0, 0]))
     (one,), (two,), (both,) = (
         [row for row in table2(trials) if (row.quantity, row.method) == ("fy", "AT (6 Hz)")]
@@ -81,7 +81,7 @@ def test_two_trials_give_their_mean_and_deviation(compared: Trial) -> None:
     assert both.rms.sd == pytest.approx(abs(one.rms.mean - two.rms.mean) / np.sqrt(2))  # type: ignore[operator]
 
 
-def test_angles_and_moments_are_compared_coordinate_by_coordinate(compared: Trial) -> None:
+def test_angles_and_moments_are_compared_coordinate_by_coordinate(compared: ComparedTrial) -> None:
     ekf, at, classical = compared.methods
     k, w = compared.coordinate_names.index("knee"), compared.window
     (angle,) = [row for row in angle_differences([compared]) if row.coordinate == "knee"]
@@ -94,7 +94,7 @@ def test_angles_and_moments_are_compared_coordinate_by_coordinate(compared: Tria
     assert moment.unit == "N m" and moment.rms.mean == pytest.approx(np.sqrt(np.nanmean(difference**2)))
 
 
-def test_files_hold_the_rows_and_replace_only_an_earlier_comparison(compared: Trial, tmp_path: Path) -> None:
+def test_files_hold_the_rows_and_replace_only_an_earlier_comparison(compared: ComparedTrial, tmp_path: Path) -> None:
     rows = table2([compared])
     folder = tmp_path / "out"
     save_comparison(folder, {"table2": rows, "angles": angle_differences([compared]), "truth": rows})

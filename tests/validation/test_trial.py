@@ -16,7 +16,7 @@ from dynakin.results.measures.mean_curves import MEASURED
 from dynakin.results.measures.repetitions import body_paths, find_repetitions
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.validation.case import Setup
-from dynakin.validation.methods import Trial, trial_of
+from dynakin.validation.methods import ComparedTrial, trial_of
 from dynakin.validation.reference.chain import PlanarChain
 from dynakin.validation.reference.classical import classical_angles, landmark_paths
 
@@ -31,7 +31,7 @@ def test_a_comparison_starts_from_the_identified_subject(setup: Setup) -> None:
     assert replace(setup, common=replace(setup.common, parameters=subject)).estimator("default").parameters is subject
 
 
-def test_nothing_is_filtered_again(compared: Trial, initial: dynakin.CalibratedModel, setup: Setup) -> None:
+def test_nothing_is_filtered_again(compared: ComparedTrial, initial: dynakin.CalibratedModel, setup: Setup) -> None:
     again = trial_of(compared.estimates, initial, setup.definition)
     for one, other in zip(compared.methods, again.methods, strict=True):
         assert one.name == other.name
@@ -40,7 +40,7 @@ def test_nothing_is_filtered_again(compared: Trial, initial: dynakin.CalibratedM
     assert again.methods[0].data is compared.estimates["default"].data
 
 
-def test_repetitions_lie_after_the_adaptation_and_every_method_has_their_curves(compared: Trial) -> None:
+def test_repetitions_lie_after_the_adaptation_and_every_method_has_their_curves(compared: ComparedTrial) -> None:
     assert compared.repetitions.movement == "squat" and compared.repetitions.items
     assert all(compared.window[r.first : r.last + 1].all() for r in compared.repetitions.items)
     curves = compared.curves()
@@ -55,7 +55,7 @@ def test_repetitions_lie_after_the_adaptation_and_every_method_has_their_curves(
 
 
 def test_a_reference_that_cannot_be_had_is_a_note_where_the_run_asks_for_whatever_there_is(
-    compared: Trial, initial: dynakin.CalibratedModel, setup: Setup
+    compared: ComparedTrial, initial: dynakin.CalibratedModel, setup: Setup
 ) -> None:
     with pytest.raises(RecordingError, match="80 Hz is not possible at 100 Hz"):
         trial_of(compared.estimates, initial, setup.definition, 80.0)
@@ -74,7 +74,7 @@ def test_a_landmark_that_the_recording_does_not_give_is_named(
         classical_angles(PlanarChain.of(initial.plan), initial.plan, landmarks)
 
 
-def test_a_walk_has_curves_of_each_foot(data_dir: Path, compared: Trial) -> None:
+def test_a_walk_has_curves_of_each_foot(data_dir: Path, compared: ComparedTrial) -> None:
     recording = dynakin.read(data_dir / "plugin_gait" / "GaitNormal_1.c3d")
     found = find_repetitions(body_paths(recording, find_ground_frame(recording)))
     short = {"time": recording.time, "repetitions": found}

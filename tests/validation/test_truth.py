@@ -15,7 +15,7 @@ from dynakin.report.text_tables import truth_text
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.case import Setup
-from dynakin.validation.methods import Method, Trial, compare_trial
+from dynakin.validation.methods import ComparedTrial, Method, compare_trial
 from dynakin.validation.truth import FIGURES, LEG, TRUTH, against_truth, truth_errors
 
 
@@ -71,7 +71,7 @@ def test_a_joint_that_is_known_nowhere_does_not_count(truth: xr.Dataset) -> None
 
 
 @pytest.fixture(scope="module")
-def compared(tmp_path_factory: pytest.TempPathFactory) -> Trial:
+def compared(tmp_path_factory: pytest.TempPathFactory) -> ComparedTrial:
     """Of a simulated squat whose truth lies beside it."""
     folder = tmp_path_factory.mktemp("squat")
     made = simulate_squat(seed=2, duration_s=5.0, mass_kg=70.0)
@@ -81,7 +81,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Trial:
     return compare_trial(replace(made.recording, path=str(folder / "markers.trc")), setup)
 
 
-def test_every_method_of_a_simulated_trial_has_every_figure(compared: Trial) -> None:
+def test_every_method_of_a_simulated_trial_has_every_figure(compared: ComparedTrial) -> None:
     _, rows = against_truth([compared])
     assert {(row.quantity, row.method) for row in rows} == {(q, m.name) for q, _ in FIGURES for m in compared.methods}
     assert all(row.rms.n == 1 and row.rms.mean is not None for row in rows)
@@ -89,7 +89,7 @@ def test_every_method_of_a_simulated_trial_has_every_figure(compared: Trial) -> 
     assert against_truth([replace(compared, estimates=elsewhere)])[1] == []
 
 
-def test_a_truth_of_another_model_is_left_out_and_that_is_said(compared: Trial) -> None:
+def test_a_truth_of_another_model_is_left_out_and_that_is_said(compared: ComparedTrial) -> None:
     assert against_truth([compared])[0] == [compared]
     in_space = {"ankle": "ankle_angle_r", "knee": "knee_angle_r", "hip": "hip_flexion_r"}
     path = Path(str(next(iter(compared.estimates.values())).recording.path)).with_name(TRUTH)
@@ -106,7 +106,7 @@ def test_a_truth_of_another_model_is_left_out_and_that_is_said(compared: Trial) 
         kept.to_netcdf(path)
 
 
-def test_methods_are_judged_over_the_moments_that_all_have_measured(compared: Trial) -> None:
+def test_methods_are_judged_over_the_moments_that_all_have_measured(compared: ComparedTrial) -> None:
     """A filter that is 50 N m off where a moment is derived, and inverse dynamics that has none there."""
     path = Path(str(next(iter(compared.estimates.values())).recording.path))
     with xr.open_dataset(path.parent / TRUTH) as stored:

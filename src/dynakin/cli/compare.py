@@ -53,7 +53,7 @@ def compare(
         from dynakin.messages import Message
         from dynakin.report.comparison_page import render_comparison
         from dynakin.validation.files import check_comparison_folder, save_comparison
-        from dynakin.validation.methods import Trial
+        from dynakin.validation.methods import ComparedTrial
         from dynakin.validation.unseen import check_horizon
 
     if output is not None:
@@ -66,7 +66,7 @@ def compare(
     console = out()
     tables: dict[str, Sequence[Any]] = {}
     more: dict[str, Any] = {"settings": settings_of(cases)}
-    compared: list[Trial] = []
+    compared: list[ComparedTrial] = []
     notes: list[Message] = []  # of what was held out; each trial keeps its own
     failed: DynakinError | None = None  # what is computed by then is kept
     if identify_trial is not None:

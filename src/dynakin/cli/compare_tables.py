@@ -18,13 +18,13 @@ from dynakin.results.measures.mean_curves import curve_points
 from dynakin.validation.case import Case
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.held_out import identify_on, judge, predict_blind
-from dynakin.validation.methods import Trial, compare_trial
+from dynakin.validation.methods import ComparedTrial, compare_trial
 from dynakin.validation.table2 import merged, table2
 from dynakin.validation.truth import TruthRow, against_truth
 from dynakin.validation.unseen import unseen, unseen_figures
 
 
-def compare_cases(cases: Sequence[Case]) -> tuple[list[Trial], list[TruthRow]]:
+def compare_cases(cases: Sequence[Case]) -> tuple[list[ComparedTrial], list[TruthRow]]:
     """All methods on all trials, and their errors where the truth is known."""
     compared = []
     for case in cases:
@@ -34,7 +34,7 @@ def compare_cases(cases: Sequence[Case]) -> tuple[list[Trial], list[TruthRow]]:
 
 
 def print_comparison(
-    console: Console, compared: Sequence[Trial], truth: Sequence[TruthRow]
+    console: Console, compared: Sequence[ComparedTrial], truth: Sequence[TruthRow]
 ) -> dict[str, Sequence[Any]]:
     """Table II, angles and moments on screen; the rows by the name of their file."""
     rows, angles, moments = table2(compared), angle_differences(compared), moment_differences(compared)
@@ -105,7 +105,7 @@ def print_unseen(console: Console, cases: Sequence[Case], horizon_ms: float) -> 
     return {"unseen": rows}
 
 
-def print_repetitions(console: Console, compared: Sequence[Trial]) -> dict[str, Sequence[Any]]:
+def print_repetitions(console: Console, compared: Sequence[ComparedTrial]) -> dict[str, Sequence[Any]]:
     """Which squats or gait cycles were found; their mean curves are for the file."""
     rows = []
     for trial in compared:
@@ -124,7 +124,7 @@ def settings_of(cases: Sequence[Case]) -> list[dict[str, Any]]:
     ]
 
 
-def described(trial: Trial) -> dict[str, Any]:
+def described(trial: ComparedTrial) -> dict[str, Any]:
     """What is written of a trial in addition to its figures."""
     seconds = trial.time[trial.window]
     return {

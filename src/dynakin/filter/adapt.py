@@ -52,7 +52,7 @@ LATE_SHARE = 0.8
 change, which the next frame hardly shows."""
 
 
-class Trial(NamedTuple):
+class Samples(NamedTuple):
     """What a tracker runs over, as `Tracker.run_arrays` takes it."""
 
     time: Array
@@ -60,10 +60,10 @@ class Trial(NamedTuple):
     wrench: Array
     contacts: ContactLoads | None
 
-    def first(self, frames: int) -> Trial:
+    def first(self, frames: int) -> Samples:
         """Its first frames."""
         contacts = self.contacts and self.contacts.first(frames)
-        return Trial(self.time[:frames], self.markers[:frames], self.wrench[:frames], contacts)
+        return Samples(self.time[:frames], self.markers[:frames], self.wrench[:frames], contacts)
 
 
 def frames_that_show(time: Array, markers: Array) -> int:
@@ -83,7 +83,7 @@ def frames_that_show(time: Array, markers: Array) -> int:
 def calibrated_noise(
     tracker: Tracker,
     arrays: dict[str, Array],
-    trial: Trial,
+    trial: Samples,
     frames: Flags | None = None,
     *,
     late: bool = False,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.filter.adapt import CALIBRATED_S, Trial, calibrated_noise, frames_that_show
+from dynakin.filter.adapt import CALIBRATED_S, Samples, calibrated_noise, frames_that_show
 from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
@@ -294,13 +294,13 @@ class Estimator:
             def first(own: Tracker, *trial: Any) -> dict[str, Array]:
                 return own.run_late_arrays(late, *trial) if once else own.run_arrays(*trial, state_only=True)
 
-            time, taken, moved, loads = Trial(recording.time, markers, ready.wrench, on_feet).first(shown)
+            time, taken, moved, loads = Samples(recording.time, markers, ready.wrench, on_feet).first(shown)
             tracker, arrays, shift, clock = run_in_step(
                 ready.tracker.fresh(), time, taken, moved, there, loads, passes, first
             )
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
-            trial = Trial(recording.time, markers, wrench, on_feet).first(shown)
+            trial = Samples(recording.time, markers, wrench, on_feet).first(shown)
             found = calibrated_noise(tracker, arrays, trial, late=not lag_s, progress=calibrating) if adapt else None
             if adapt and found is None:
                 notes.append(

@@ -29,7 +29,7 @@ from dynakin.results.measures.tracking import refuse_lost
 from dynakin.results.records import Event
 from dynakin.settings.settings import Settings
 from dynakin.settings.strict import nearest
-from dynakin.validation.methods import Trial
+from dynakin.validation.methods import ComparedTrial
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,7 +53,7 @@ class Result:
 
     estimate: Estimate
     model: CalibratedModel | None = None
-    comparison: Trial | None = None
+    comparison: ComparedTrial | None = None
     observability: Identifiability | None = None
     settings: Settings | None = None
     failures: Failures = field(default_factory=Failures)

@@ -23,7 +23,7 @@ from dynakin.settings.noise import Noise
 from dynakin.settings.settings import Settings, read_keys
 from dynakin.settings.subject import Subject
 from dynakin.validation.case import Case, case_of
-from dynakin.validation.methods import Trial, estimate_each, trial_of, with_lost
+from dynakin.validation.methods import ComparedTrial, estimate_each, trial_of, with_lost
 
 if TYPE_CHECKING:  # loaded while the core works
     from dynakin.identification.observability.structure import Structure
@@ -240,7 +240,7 @@ def judged(
     estimates = {title: case.with_config(title, estimate) for title, estimate in estimates.items()}
     title, first = next(iter(estimates.items()))
     initial = list(trackers.values())[-1].calibrated
-    comparison: Trial | None = None
+    comparison: ComparedTrial | None = None
     with failures.stage("comparison with the reference methods"), stage("comparing with the reference methods"):
         setup = case.setup
         comparison = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, tolerant=tolerant)

@@ -18,7 +18,7 @@ from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_
 from dynakin.results.files.config import plain, versions
 from dynakin.results.naming import listed, number, plural, sentence
 from dynakin.units import COMPONENTS
-from dynakin.validation.methods import Trial
+from dynakin.validation.methods import ComparedTrial
 from dynakin.validation.table2 import MARKERS, Row
 from dynakin.validation.unseen import UnseenRow
 
@@ -38,7 +38,7 @@ ABOUT_UNSEEN = (
 
 
 def render_comparison(
-    trials: Sequence[Trial],
+    trials: Sequence[ComparedTrial],
     tables: Mapping[str, Sequence[Any]],
     settings: Sequence[Mapping[str, Any]],
     names: Sequence[str],
@@ -77,7 +77,7 @@ def render_comparison(
     )
 
 
-def _what_was_compared(trials: Sequence[Trial], names: Sequence[str]) -> str:
+def _what_was_compared(trials: Sequence[ComparedTrial], names: Sequence[str]) -> str:
     if not trials:
         return f"Identified on {names[0]}, judged on {names[1]} from markers alone."
     methods = list(dict.fromkeys(method.name for trial in trials for method in trial.methods))
@@ -88,7 +88,7 @@ def _what_was_compared(trials: Sequence[Trial], names: Sequence[str]) -> str:
     return f"{seconds[0]:g} to {seconds[-1]:g} s of one trial of {who} by {listed(methods)}."
 
 
-def _sections(trials: Sequence[Trial], tables: Mapping[str, Sequence[Any]]) -> list[Section]:
+def _sections(trials: Sequence[ComparedTrial], tables: Mapping[str, Sequence[Any]]) -> list[Section]:
     found = []
     over = "" if len(trials) == 1 else f", mean ± standard deviation over {len(trials)} trials"
     if rows := tables.get("table2"):

@@ -28,7 +28,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import UNKNOWN
 from dynakin.results.naming import listed, number, plural, shown_unit
 from dynakin.settings.lag import in_words
-from dynakin.validation.methods import Trial
+from dynakin.validation.methods import ComparedTrial
 
 _BOTH = (repetition_section, methods_section, length_section, mass_section, observability_section)
 SECTIONS: dict[str, tuple[Callable[[Page], Section | None], ...]] = {
@@ -68,7 +68,9 @@ def templates() -> jinja2.Environment:
     return found
 
 
-def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, comparison: Trial | None = None) -> str:
+def render_report(
+    estimate: Estimate, *, metrics: dict[str, Any] | None = None, comparison: ComparedTrial | None = None
+) -> str:
     """The report of a run as one HTML text that needs nothing else.
 
     Args:
@@ -109,7 +111,7 @@ def sections_of(page: Page) -> list[Section]:
 
 
 def write_report(
-    estimate: Estimate, path: Path, *, metrics: dict[str, Any] | None = None, comparison: Trial | None = None
+    estimate: Estimate, path: Path, *, metrics: dict[str, Any] | None = None, comparison: ComparedTrial | None = None
 ) -> None:
     """Write `render_report` to ``path``."""
     html = render_report(estimate, metrics=metrics, comparison=comparison)

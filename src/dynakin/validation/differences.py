@@ -10,7 +10,7 @@ import numpy as np
 
 from dynakin.results.measures.fit import SignalFit, TruthError, signal_fit, truth_error
 from dynakin.results.measures.power import root_coordinates
-from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
+from dynakin.validation.methods import AT, CLASSICAL, ComparedTrial, Method
 from dynakin.validation.reference.inverse_dynamics import INVERSE
 from dynakin.validation.table2 import Spread, spread
 
@@ -47,7 +47,7 @@ class MomentDifference:
     correlation: Spread
 
 
-def angle_differences(trials: Sequence[Trial]) -> list[AngleDifference]:
+def angle_differences(trials: Sequence[ComparedTrial]) -> list[AngleDifference]:
     """Every coordinate of every filter against the classical method; empty where that cannot be had."""
     found: dict[tuple[str, str, str, str], list[TruthError]] = {}
     for trial in trials:
@@ -66,7 +66,7 @@ def angle_differences(trials: Sequence[Trial]) -> list[AngleDifference]:
     ]
 
 
-def moment_differences(trials: Sequence[Trial]) -> list[MomentDifference]:
+def moment_differences(trials: Sequence[ComparedTrial]) -> list[MomentDifference]:
     """Every measured joint moment of every filter against AT's; empty where that cannot be had."""
     found: dict[tuple[str, str, str, str], list[SignalFit]] = {}
     for trial in trials:
@@ -85,7 +85,7 @@ def moment_differences(trials: Sequence[Trial]) -> list[MomentDifference]:
     ]
 
 
-def _pairs(trial: Trial, kind: str) -> list[tuple[Method, Method]]:
+def _pairs(trial: ComparedTrial, kind: str) -> list[tuple[Method, Method]]:
     """Each filter with the reference of that kind."""
     reference = trial.reference(kind)
     return [] if reference is None else [(method, reference) for method in trial.of_kind("EKF")]

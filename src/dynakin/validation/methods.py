@@ -85,7 +85,7 @@ class Method:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class ComparedTrial:
     """A recording with what all methods make of it.
 
     Attributes:
@@ -142,7 +142,7 @@ class Trial:
 @one_blas_thread
 def compare_trial(
     recording: Recording, setup: Setup, *, static: Recording | None = None, progress: Progress | None = None
-) -> Trial:
+) -> ComparedTrial:
     """Run every preset and the reference methods.
 
     "AT" is the paper's: classical angles, low-passed, on a chain of constant lengths with the table's inertia.
@@ -163,7 +163,7 @@ def compare_trial(
     return with_lost(replace(trial, notes=tuple(dict.fromkeys((*said, *mass, *trial.notes)))), lost)
 
 
-def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:
+def with_lost(trial: ComparedTrial, lost: Mapping[str, str]) -> ComparedTrial:
     """The trial with the filters that lost the person, which are left out, in its notes."""
     notes = [warning("lost", f"EKF ({preset}) is left out: {reason}.") for preset, reason in lost.items()]
     return replace(trial, notes=(*trial.notes, *notes), lost=dict(lost))
@@ -220,7 +220,7 @@ def trial_of(
     *,
     tolerant: bool = False,
     inverse: bool = False,
-) -> Trial:
+) -> ComparedTrial:
     """Estimates of one recording against the reference methods on it; nothing is filtered again.
 
     Args:
@@ -250,7 +250,7 @@ def trial_of(
             raise
         notes.append(note("method", f"AT and the classical method are left out: {error.message}"))
     data = first.data
-    return Trial(
+    return ComparedTrial(
         name=first.recording.name,
         time=first.time,
         window=evaluation_window(first.time),

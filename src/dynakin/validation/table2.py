@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dynakin.arrays import rms_length
 from dynakin.results.measures.fit import SignalFit, signal_fit
 from dynakin.units import COMPONENTS
-from dynakin.validation.methods import Mask, Trial
+from dynakin.validation.methods import ComparedTrial, Mask
 
 Array = npt.NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def mean_fit(fits: Sequence[SignalFit]) -> SignalFit:
     return SignalFit(*(spread([fit[k] for fit in fits]).mean for k in range(len(SignalFit._fields))))
 
 
-def trial_fits(trial: Trial) -> dict[tuple[str, str], SignalFit]:
+def trial_fits(trial: ComparedTrial) -> dict[tuple[str, str], SignalFit]:
     """Fit over the trial's window of each (quantity, method): "markers", each marker, each modelled component."""
     w = trial.window
     found: dict[tuple[str, str], SignalFit] = {}
@@ -86,7 +86,7 @@ def trial_fits(trial: Trial) -> dict[tuple[str, str], SignalFit]:
     return found
 
 
-def table2(trials: Sequence[Trial]) -> list[Row]:
+def table2(trials: Sequence[ComparedTrial]) -> list[Row]:
     """Rows by quantity, then method: all markers, the wrench, then each marker; over one or many trials."""
     return table2_of([trial_fits(trial) for trial in trials])
 

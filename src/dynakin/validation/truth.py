@@ -18,7 +18,7 @@ from dynakin.results.measures.sources import legs_of
 from dynakin.results.naming import listed
 from dynakin.results.records import Parameter
 from dynakin.units import COMPONENTS
-from dynakin.validation.methods import Trial
+from dynakin.validation.methods import ComparedTrial
 from dynakin.validation.table2 import Spread, spread
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class TruthRow:
     rms: Spread
 
 
-def against_truth(trials: Sequence[Trial]) -> tuple[list[Trial], list[TruthRow]]:
+def against_truth(trials: Sequence[ComparedTrial]) -> tuple[list[ComparedTrial], list[TruthRow]]:
     """Every method's errors on the trials that were simulated by dynakin, none where none was; and the trials, with a
     note where one was simulated with a model of other coordinates, so that no error can be had.
 
@@ -66,7 +66,7 @@ def against_truth(trials: Sequence[Trial]) -> tuple[list[Trial], list[TruthRow]]
     import xarray as xr  # the slowest library of all, which reading a trial does without
 
     found: dict[tuple[str, str, str], list[float]] = {}
-    noted: list[Trial] = []
+    noted: list[ComparedTrial] = []
     for trial in trials:
         noted.append(trial)
         path = _truth_file(trial)
@@ -95,24 +95,24 @@ def against_truth(trials: Sequence[Trial]) -> tuple[list[Trial], list[TruthRow]]
     return noted, rows
 
 
-def _truth_file(trial: Trial) -> Path | None:
+def _truth_file(trial: ComparedTrial) -> Path | None:
     path = next(iter(trial.estimates.values())).recording.path
     found = None if path is None else Path(path).parent / TRUTH
     return found if found is not None and found.exists() else None
 
 
-def _is_of(truth: xr.Dataset, trial: Trial) -> bool:
+def _is_of(truth: xr.Dataset, trial: ComparedTrial) -> bool:
     """Whether the truth is that of this recording, by its times."""
     return truth.sizes["time"] == len(trial.time) and np.allclose(truth["time"].values, trial.time)
 
 
-def _leg_joints(trial: Trial) -> Sequence[str]:
+def _leg_joints(trial: ComparedTrial) -> Sequence[str]:
     """Coordinates of the legs, whose moments count."""
     legs = legs_of(next(iter(trial.estimates.values())).data)
     return [name for name, leg in zip(trial.coordinate_names, legs, strict=True) if leg] or LEG
 
 
-def _where_all_say(trial: Trial) -> list[xr.Dataset]:
+def _where_all_say(trial: ComparedTrial) -> list[xr.Dataset]:
     """Data of each method, NaN where another method has nothing; one that nowhere has the quantity does not count."""
     import xarray as xr
 

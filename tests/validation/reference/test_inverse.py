@@ -18,7 +18,7 @@ from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
 from dynakin.validation.case import Setup
-from dynakin.validation.methods import Trial, compare_trial
+from dynakin.validation.methods import ComparedTrial, compare_trial
 from dynakin.validation.reference.inverse_dynamics import INVERSE, RigidMotion, inverse_name, rigid_motions
 
 FLEXION = [f"{joint}_{side}" for joint in ("hip_flexion", "knee_angle", "ankle_angle") for side in "rl"]
@@ -111,7 +111,7 @@ def test_wrench_and_moments_are_near_the_simulated_truth(simulated: SimulatedTri
 def test_beside_the_filter_it_has_the_same_labels_and_says_what_it_leaves(
     simulated: SimulatedTrial, setup: Setup
 ) -> None:
-    trial: Trial = compare_trial(simulated.recording, setup)
+    trial: ComparedTrial = compare_trial(simulated.recording, setup)
     assert [method.name for method in trial.methods] == ["EKF (default)", "IK + ID (6 Hz)", "IK + ID (12 Hz)"]
     assert trial.methods[1].kind == INVERSE and trial.methods[1].name == inverse_name(6.0)
     assert any("What it leaves at the pelvis" in note for note in map(str, trial.notes))

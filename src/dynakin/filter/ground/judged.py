@@ -78,7 +78,7 @@ class Ground:
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class GroundTrial:
     """What is judged: markers (T, M, 3) m, of the model, ground frame; assigned, tolerance: as for `known_ground`."""
 
     recording: Recording
@@ -100,17 +100,17 @@ class Trial:
         """(P, T, 6) of each plate."""
         return np.stack([self.initial.ground.wrench_to_ground(plate.wrench) for plate in self.recording.plates])
 
-    def in_step(self, delay: Delay) -> Trial:
+    def in_step(self, delay: Delay) -> GroundTrial:
         """The same of what the plates say so much later."""
         return replace(self, recording=brought_into_step(self.recording, delay))
 
-    def without_plates(self) -> Trial:
+    def without_plates(self) -> GroundTrial:
         """The same of the markers alone."""
         return replace(self, recording=self.recording.with_plates(()), assigned=None)
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class Footing:
     """Who stands where, by feet and plates.
 
     Attributes:
@@ -121,7 +121,7 @@ class Standing:
         needed: what the motion needs; None of a model that stands on its root.
     """
 
-    trial: Trial
+    trial: GroundTrial
     loads: FootLoads | None
     may: Flags
     by_plate: list[bool]
@@ -131,7 +131,7 @@ class Standing:
     needed: Needed | None
 
     @staticmethod
-    def of(trial: Trial) -> Standing:
+    def of(trial: GroundTrial) -> Footing:
         """Of a trial.
 
         Raises:
@@ -146,7 +146,7 @@ class Standing:
             loads = _loads_of_feet(replace(trial, assigned=own))
         by_plate = [loads is not None and name in loads.others for name in initial.contacts]
         may &= ~np.array(by_plate, dtype=bool)
-        found = Standing(trial, loads, may, by_plate, taken, None, NO_SHEAR, None)
+        found = Footing(trial, loads, may, by_plate, taken, None, NO_SHEAR, None)
         if not recording.plates:
             return found
         # steps off the plates: their mean load is no mass
@@ -185,7 +185,7 @@ class Standing:
         if self.check is None:
             return self._without_plates()
         if self.check.unused:
-            ground, nothing = Standing.of(self.trial.without_plates()).judged()
+            ground, nothing = Footing.of(self.trial.without_plates()).judged()
             loads = ground.loads
             if loads is not None:  # the recording keeps its plates, with nobody on any
                 on = np.zeros((len(nothing), len(loads.feet), len(self.trial.recording.plates)), dtype=bool)
@@ -269,7 +269,7 @@ class Standing:
         return np.where(loads.total_known[:, None], self._all_of_it(needed)[:, :3], np.nan)
 
 
-def _loads_of_feet(trial: Trial) -> FootLoads | None:
+def _loads_of_feet(trial: GroundTrial) -> FootLoads | None:
     """What each foot carries by feet and plates; None of a model that stands on its root."""
     recording, initial, assigned = trial.recording, trial.initial, trial.assigned
     if not initial.feet:  # it takes all plates together, and is told wrong names all the same

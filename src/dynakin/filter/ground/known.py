@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in_words, out_of_step_in_words
 from dynakin.filter.ground.fine_delay import UNKNOWN_S, clock_delay
-from dynakin.filter.ground.judged import Ground, Standing, Trial
+from dynakin.filter.ground.judged import Footing, Ground, GroundTrial
 from dynakin.filter.ground.plate_sum import MASS_APART
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -54,14 +54,14 @@ def known_ground(
     Raises:
         RecordingError: the plates are refused.
     """
-    trial, zeros = _zeroed(Trial(recording, initial, markers, assigned, tolerance))
-    as_it_is = Standing.of(trial)
+    trial, zeros = _zeroed(GroundTrial(recording, initial, markers, assigned, tolerance))
+    as_it_is = Footing.of(trial)
     coarse = as_it_is.coarse_delay()
-    standing = as_it_is if coarse is None else Standing.of(trial.in_step(coarse))
-    ground, known = standing.judged()
+    footing = as_it_is if coarse is None else Footing.of(trial.in_step(coarse))
+    ground, known = footing.judged()
     clock = _Clock(coarse, 0.0 if coarse is None else coarse.sd_s, ())
     if ground.loads is not None and ground.loads.on.any():
-        clock, ground, known = _in_step(as_it_is, coarse, standing, ground, known)
+        clock, ground, known = _in_step(as_it_is, coarse, footing, ground, known)
     moved = () if clock.taken is None else (_taken_in_words(clock.taken, recording, not initial.unseen_kg),)
     behind_s = 0.0 if clock.taken is None else clock.taken.delay_s
     notes = (*zeros, *moved, *ground.notes, *clock.notes)
@@ -78,24 +78,24 @@ class _Clock(NamedTuple):
 
 
 def _in_step(
-    as_it_is: Standing, coarse: Delay | None, standing: Standing, ground: Ground, known: Array
+    as_it_is: Footing, coarse: Delay | None, footing: Footing, ground: Ground, known: Array
 ) -> tuple[_Clock, Ground, Array]:
     """How far the plates are out of step, to a millisecond or two where the movement shows it, and what is known of
     the ground once they are not.
 
     Args:
-        coarse: the delay that ``standing``, and what was judged of it (``ground``, ``known`` (T, 6)), are without.
+        coarse: the delay that ``footing``, and what was judged of it (``ground``, ``known`` (T, 6)), are without.
     """
     trial, initial = as_it_is.trial, as_it_is.trial.initial
     whole, fine, left = not initial.unseen_kg, None, None
     for _ in range(ROUNDS):
-        plates = standing.trial.wrenches
+        plates = footing.trial.wrenches
         left = clock_delay(initial, trial.recording.time, trial.markers, known, not says_carried(ground.notes), plates)
         if left is None or not left.worth_it(whole or coarse is not None or fine is not None):
             break
         fine = left.after(fine or coarse or IN_STEP)
-        standing = Standing.of(trial.in_step(fine))
-        ground, known = standing.judged()
+        footing = Footing.of(trial.in_step(fine))
+        ground, known = footing.judged()
         if whole and not left.apart:
             break
     if fine is not None and fine.worth_it(whole):
@@ -127,7 +127,7 @@ def _taken_in_words(delay: Delay, recording: Recording, whole: bool) -> Message:
     return warning("in step", f"{text} Not all of the body is marked, so that no better is known.")
 
 
-def _zeroed(trial: Trial) -> tuple[Trial, list[Message]]:
+def _zeroed(trial: GroundTrial) -> tuple[GroundTrial, list[Message]]:
     """The trial without what its plates read while nobody is on them, with sentences on it; as it is where a
     contact is declared, which may bear on any plate, or where the person weighs no less than all of it."""
     initial = trial.initial
@@ -142,7 +142,7 @@ def _zeroed(trial: Trial) -> tuple[Trial, list[Message]]:
     return (trial, []) if bears else (zeroed, said)
 
 
-def _median_load(trial: Trial) -> float:
+def _median_load(trial: GroundTrial) -> float:
     """N, of all plates."""
     load = trial.wrench[:, 1]
     return float(np.median(load[np.isfinite(load)])) if np.isfinite(load).any() else 0.0

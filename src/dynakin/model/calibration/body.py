@@ -12,7 +12,7 @@ from dynakin.arrays import rms, runs
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.completion import Proportions
-from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
@@ -207,7 +207,7 @@ def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) ->
 
 
 def find_height(
-    subject: Subject, recordings: list[Recording], trial: Trial, finder: LandmarkFinder | None = None
+    subject: Subject, recordings: list[Recording], trial: MarkedTrial, finder: LandmarkFinder | None = None
 ) -> tuple[float | None, list[Message]]:
     """Height (m) and where it comes from; None with the reason where nothing gives it.
 
@@ -254,7 +254,7 @@ TOO_SMALL, TOO_LARGE = 0.15, 0.2
 less high of who stands with bent legs."""
 
 
-def doubtful_height(subject: Subject, trial: Trial, stands: bool) -> list[Message]:
+def doubtful_height(subject: Subject, trial: MarkedTrial, stands: bool) -> list[Message]:
     """A warning where a height that is given is none of who wears the markers.
 
     Args:
@@ -278,7 +278,7 @@ def doubtful_height(subject: Subject, trial: Trial, stands: bool) -> list[Messag
     return [warning("height", text)]
 
 
-def _by_proportions(trial: Trial, finder: LandmarkFinder) -> tuple[float, list[Message]]:
+def _by_proportions(trial: MarkedTrial, finder: LandmarkFinder) -> tuple[float, list[Message]]:
     """Height (m) from the highest landmark that needs no height itself, over a foot that stands."""
     feet = [name for names in trial.match.foot_markers.values() for name in names]
     for name in _HEIGHT_BY if feet else ():
@@ -302,7 +302,7 @@ def _by_proportions(trial: Trial, finder: LandmarkFinder) -> tuple[float, list[M
     return MEAN_HEIGHT_M, [note("height", f"Height {MEAN_HEIGHT_M:.2f} m: assumed."), warning("height", doubt)]
 
 
-def _over_lowest(trial: Trial, tops: list[Array], over: Array) -> tuple[float, str]:
+def _over_lowest(trial: MarkedTrial, tops: list[Array], over: Array) -> tuple[float, str]:
     """Height (m) of markers over the lowest one, where they are highest, and which one that is."""
     top, lowest = np.mean([np.nanpercentile(path[:, 1], 99.0) for path in tops]), "lowest marker"
     reach = float(top - np.nanmin([np.nanpercentile(path[:, 1], 1.0) for path in _seen(trial)]))
@@ -311,11 +311,11 @@ def _over_lowest(trial: Trial, tops: list[Array], over: Array) -> tuple[float, s
     return reach, lowest
 
 
-def _seen(trial: Trial) -> list[Array]:
+def _seen(trial: MarkedTrial) -> list[Array]:
     return [path for path in trial.paths.values() if np.isfinite(path).all(axis=1).any()]
 
 
-def _over_the_foot(trial: Trial, tops: list[Array]) -> Array:
+def _over_the_foot(trial: MarkedTrial, tops: list[Array]) -> Array:
     """Heights (K,) m of the mean of markers (T, 3) over the lowest one, in the frames in which that one stands still,
     or in all where it never does, as on a treadmill."""
     time, places = trial.recording.time, np.stack(list(trial.paths.values()), axis=1)

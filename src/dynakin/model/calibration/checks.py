@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
-from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.inertia import RigidBody
@@ -26,7 +26,7 @@ we have, and simulated ones, 1 to 17; with one leg ahead or lifted 25; a deep sq
 _NOWHERE = (np.nan, np.nan, np.nan)
 
 
-def refuse_moving_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder) -> None:
+def refuse_moving_origin(model: ModelFile, trial: MarkedTrial, finder: LandmarkFinder) -> None:
     """Refuse a trial in which the landmark that the model holds fixed in the ground moves, on either foot.
 
     Raises:

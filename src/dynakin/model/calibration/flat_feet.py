@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from dynakin.messages import Message, note, warning
-from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.sites import Candidate
 from dynakin.model.markers.anatomy import standing_at
@@ -25,7 +25,7 @@ to 4 deg) and tiptoe (28), and on `opencap_subject4` (3 to 6); of 20 other real 
 walk whose own standing trial says that it is 14 deg off, and a leg that is held up."""
 
 
-def flat_slopes(trial: Trial) -> dict[str, float]:
+def flat_slopes(trial: MarkedTrial) -> dict[str, float]:
     """Side -> slope (rad) of the line from heel to toe while that foot stands flat; none for a foot that never does."""
     found: dict[str, float] = {}
     for side in SIDES:
@@ -41,7 +41,7 @@ def flat_slopes(trial: Trial) -> dict[str, float]:
     return found
 
 
-def lost_on_feet(trial: Trial, standing: Trial) -> list[Message]:
+def lost_on_feet(trial: MarkedTrial, standing: MarkedTrial) -> list[Message]:
     """Sentences on markers of a foot that the standing trial has and the trial has not: they end its sole."""
     found = []
     for side, names in standing.match.foot_markers.items():

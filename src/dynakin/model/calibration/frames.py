@@ -26,7 +26,7 @@ _WAYS = 200  # in which markers lack together, the ones with fewest markers that
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class MarkedTrial:
     """A recording with its markers matched and in the ground frame."""
 
     recording: Recording
@@ -35,18 +35,18 @@ class Trial:
     paths: dict[MarkerKey, Array]  # (T, 3) m, ground frame
 
     @classmethod
-    def of(cls, recording: Recording, match: MarkerMatch, ground: GroundFrame) -> Trial:
+    def of(cls, recording: Recording, match: MarkerMatch, ground: GroundFrame) -> MarkedTrial:
         """Turns the matched markers into the ground frame."""
         paths = {key: ground.points_to_ground(recording.marker(name)) for key, name in match.names.items()}
         return cls(recording, match, ground, paths)
 
-    def facing(self) -> Trial:
+    def facing(self) -> MarkedTrial:
         """The same trial with X in the direction in which the person faces."""
-        return Trial.of(self.recording, self.match, self.ground.facing())
+        return MarkedTrial.of(self.recording, self.match, self.ground.facing())
 
-    def about(self, origin_L: Array) -> Trial:
+    def about(self, origin_L: Array) -> MarkedTrial:
         """The same trial with the ground origin at ``origin_L`` (3,) m, laboratory frame."""
-        return Trial.of(self.recording, self.match, self.ground.with_origin(origin_L))
+        return MarkedTrial.of(self.recording, self.match, self.ground.with_origin(origin_L))
 
     def usable(self, keys: set[MarkerKey]) -> npt.NDArray[np.bool_]:
         """(T,) frames in which all these markers are seen."""

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note
-from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.joint_motion import (
     BLOCKS,
     Centre,
@@ -59,7 +59,7 @@ def functional_landmarks(
     trials: Mapping[str, Recording],
     landmarks: Mapping[str, Array],
     finder: LandmarkFinder,
-    source: Trial,
+    source: MarkedTrial,
     frames: npt.NDArray[np.intp],
 ) -> tuple[dict[str, Array], list[Message]]:
     """Landmarks of models in space, those of the joints replaced that functional trials show, and sentences on it.
@@ -204,7 +204,7 @@ def joint_motion(
     joint: str,
     trial: Recording,
     landmarks: Mapping[str, Array],
-    source: Trial,
+    source: MarkedTrial,
     frames: npt.NDArray[np.intp],
     where: str,
 ) -> tuple[JointMotion, list[str]]:
@@ -224,7 +224,7 @@ def joint_motion(
 
 
 def _rigid_part(
-    names: dict[str, str], part: str, trial: Recording, source: Trial, frames: npt.NDArray[np.intp], where: str
+    names: dict[str, str], part: str, trial: Recording, source: MarkedTrial, frames: npt.NDArray[np.intp], where: str
 ) -> tuple[RigidMotion, list[str]]:
     """Motion of a segment since standing by those of its markers that have kept their shape, and the others' names."""
     own, left_out = dict(names), list[str]()
@@ -255,7 +255,7 @@ def _usual(motion: RigidMotion) -> float:
     return float(np.percentile(seen, 90.0)) if len(seen) else np.inf
 
 
-def _standing(source: Trial, name: str, frames: npt.NDArray[np.intp]) -> Array:
+def _standing(source: MarkedTrial, name: str, frames: npt.NDArray[np.intp]) -> Array:
     """A marker's place (3,) m in the ground frame; NaN where it is not seen."""
     path = source.ground.points_to_ground(source.recording.marker(name)[frames])
     seen = path[np.isfinite(path).all(axis=1)]
@@ -267,7 +267,7 @@ def _markers_of(
     letter: str,
     trial: Recording,
     landmarks: Mapping[str, Array],
-    source: Trial,
+    source: MarkedTrial,
     frames: npt.NDArray[np.intp],
     where: str,
 ) -> dict[str, str]:

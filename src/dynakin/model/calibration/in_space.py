@@ -13,7 +13,7 @@ from dynakin.arrays import rms
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note
-from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.pose_start import PoseFit, near, start_posture
 from dynakin.model.calibration.sites import Candidate, site_of
 from dynakin.model.plan import Geometry, ModelPlan, Site
@@ -44,7 +44,7 @@ class Started:
     held: dict[str, str]  # coordinates that are locked because the markers do not show them, and why
 
 
-def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], still: bool) -> Started:
+def started(plan: ModelPlan, trial: MarkedTrial, unplaced: tuple[Candidate, ...], still: bool) -> Started:
     """The plan with its coordinates fitted to the trial's first frame, and with the markers seen only later.
 
     Args:
@@ -159,7 +159,7 @@ def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tup
 
 
 def _speeds(
-    model: _core.Model, paths: Array, trial: Trial, first: int, fit: PoseFit, limits: dict[str, Interval]
+    model: _core.Model, paths: Array, trial: MarkedTrial, first: int, fit: PoseFit, limits: dict[str, Interval]
 ) -> dict[str, float]:
     """Rates of the coordinates at the first frame, by a parabola through the next ones; people start in mid-stride."""
     time = trial.recording.time
@@ -183,7 +183,7 @@ def _spread(frames: npt.NDArray[np.intp], most: int) -> npt.NDArray[np.intp]:
     return frames[np.unique(np.linspace(0, len(frames) - 1, most).astype(int))] if len(frames) else frames
 
 
-def _paths(trial: Trial, sites: tuple[Site, ...]) -> Array:
+def _paths(trial: MarkedTrial, sites: tuple[Site, ...]) -> Array:
     recorded = [trial.recording.marker(site.recorded) for site in sites]
     return trial.ground.points_to_ground(np.stack(recorded, axis=1))
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from dynakin.errors import ModelError
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.completion import free
-from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.needs import in_words, needs
 from dynakin.model.calibration.posture import frame_landmarks
@@ -85,7 +85,7 @@ def table_markers(model: ModelFile, table: BodyTable, finder: LandmarkFinder) ->
 
 
 def seen_together(
-    model: ModelFile, finder: LandmarkFinder, match: MarkerMatch, source: Trial
+    model: ModelFile, finder: LandmarkFinder, match: MarkerMatch, source: MarkedTrial
 ) -> tuple[LandmarkFinder, list[Message]]:
     """The finder without markers that are never seen with the others of the landmarks, whose recipes fall back on what
     is left, and a sentence on them. They stay markers of their segments.

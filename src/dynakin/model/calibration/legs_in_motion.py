@@ -19,7 +19,7 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.completion import Completed, Proportions, laid
-from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.functional import (
     CENTRE_RESIDUAL_M,
     KNEE_DEG,
@@ -67,7 +67,11 @@ class Legs:
 
 
 def legs_in_motion(
-    landmarks: Mapping[str, Array], moving: Recording, source: Trial, frames: npt.NDArray[np.intp], height_m: float
+    landmarks: Mapping[str, Array],
+    moving: Recording,
+    source: MarkedTrial,
+    frames: npt.NDArray[np.intp],
+    height_m: float,
 ) -> Legs:
     """Knees and ankles that are lacking.
 
@@ -109,7 +113,7 @@ class _Leg:
     landmarks: Mapping[str, Array]
     letter: str
     moving: Recording
-    source: Trial
+    source: MarkedTrial
     frames: npt.NDArray[np.intp]
     height_m: float
 
@@ -232,7 +236,7 @@ def supposed_legs(found: Completed, legs: Legs, chosen: Sequence[Candidate]) -> 
 
 
 def no_legs(
-    supposed: Sequence[str], source: Trial, static: Recording | None, legs: Legs, finder: LandmarkFinder
+    supposed: Sequence[str], source: MarkedTrial, static: Recording | None, legs: Legs, finder: LandmarkFinder
 ) -> ModelError:
     """Of legs that, laid out as those of an adult who stands, are tens of degrees off where nobody does."""
     expected = "a standing trial with markers on knees and ankles (--static)"
@@ -265,7 +269,7 @@ def not_understood(match: MarkerMatch, file: str) -> str:
     )
 
 
-def unmarked_legs(unmarked: Sequence[str], source: Trial, static: Recording | None) -> Message:
+def unmarked_legs(unmarked: Sequence[str], source: MarkedTrial, static: Recording | None) -> Message:
     """Of knees and ankles that are where the movement or proportions have them, and what would show them."""
     joints = listed([words(name) for name in sorted(unmarked)])
     text = (

@@ -24,7 +24,7 @@ from dynakin.model.calibration.checks import (
 )
 from dynakin.model.calibration.completion import Completed, completed
 from dynakin.model.calibration.flat_feet import flat_slopes, lost_on_feet, never_flat, raised_heels, usual_slopes
-from dynakin.model.calibration.frames import Trial, choose_side
+from dynakin.model.calibration.frames import MarkedTrial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmark_markers import in_both, needed_markers, seen_together, table_markers
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
@@ -95,7 +95,7 @@ class Measured:
     height_m: float | None
     parts: dict[str, list[PlacedPart]]
     messages: tuple[Message, ...]
-    trial: Trial
+    trial: MarkedTrial
     unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
     held: dict[str, str]  # coordinate -> why nothing shows it
     unmarked_joints: tuple[str, ...]  # knees and ankles that no marker shows
@@ -107,9 +107,9 @@ class Measured:
 class _Trials:
     """The recordings with their markers known by name."""
 
-    as_asked: Trial
-    trial: Trial  # of a floating model with X forward: what is measured on landmarks takes it for that
-    source: Trial  # where lengths and places are measured: the standing trial, or the same
+    as_asked: MarkedTrial
+    trial: MarkedTrial  # of a floating model with X forward: what is measured on landmarks takes it for that
+    source: MarkedTrial  # where lengths and places are measured: the standing trial, or the same
     side: str
 
 
@@ -130,8 +130,8 @@ class _Marked:
 class _Still:
     """The frames on which lengths and places are measured, about the model's ground origin."""
 
-    trial: Trial
-    source: Trial
+    trial: MarkedTrial
+    source: MarkedTrial
     frames: npt.NDArray[np.intp]
     stands: bool
 
@@ -238,7 +238,9 @@ def _matched(asked: Asked, messages: list[Message]) -> _Trials:
         refuse_unfit(asked.marker_set, recording)
     recognised = recognise(recording, asked.marker_set)
     messages += recognised.messages
-    as_asked = Trial.of(recording, recognised.match, asked.ground or asked.find_ground(recording, recognised.match))
+    as_asked = MarkedTrial.of(
+        recording, recognised.match, asked.ground or asked.find_ground(recording, recognised.match)
+    )
     messages += [note("ground", text) for text in as_asked.ground.how]
     trial = as_asked.facing() if model.floating else as_asked
     side = "both"
@@ -249,7 +251,7 @@ def _matched(asked: Asked, messages: list[Message]) -> _Trials:
         return _Trials(as_asked, trial, trial, side)
     stands = recognise_standing(static, recording, recognised)
     messages += stands.messages
-    source = Trial.of(static, stands.match, asked.find_ground(static, stands.match))
+    source = MarkedTrial.of(static, stands.match, asked.find_ground(static, stands.match))
     source = source.facing() if model.floating else source
     messages += lost_on_feet(trial, source) if model.sided else []
     if other := another_person(recording, static):
@@ -361,7 +363,9 @@ def _mass_and_height(
     return mass_kg, height_m
 
 
-def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: npt.NDArray[np.intp]) -> Trial:
+def _at_origin(
+    model: ModelFile, trial: MarkedTrial, finder: LandmarkFinder, frames: npt.NDArray[np.intp]
+) -> MarkedTrial:
     if model.ground.origin is None:
         return trial
     # the middle of the landmark's markers, out of plane as well, so that the ground origin is a point of the
@@ -377,7 +381,7 @@ def _first_posture(
     model: ModelFile,
     geometry: Geometry,
     finder: LandmarkFinder,
-    trial: Trial,
+    trial: MarkedTrial,
     needed: set[MarkerKey],
     standing: Posture,
     messages: list[Message],

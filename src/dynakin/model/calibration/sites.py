@@ -8,7 +8,7 @@ import numpy as np
 
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
-from dynakin.model.calibration.frames import FIRST_FRAMES, Trial
+from dynakin.model.calibration.frames import FIRST_FRAMES, MarkedTrial
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.posture import Posture, find_posture, frame_landmarks
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
@@ -143,8 +143,8 @@ def find_locks(
 
 def place_sites(
     chosen: list[Candidate],
-    calibration: tuple[Trial, Posture, np.ndarray],
-    trial: Trial,
+    calibration: tuple[MarkedTrial, Posture, np.ndarray],
+    trial: MarkedTrial,
     finder: LandmarkFinder,
     geometry: Geometry,
     model: ModelFile,

@@ -27,9 +27,9 @@ from dynakin.report.paper_figures.sensitivity import Sensitivity, sensitivity_fi
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
-from dynakin.validation.methods import Trial
+from dynakin.validation.methods import ComparedTrial
 
-Draw = Callable[[Estimate, Trial | None], Figure | None]
+Draw = Callable[[Estimate, ComparedTrial | None], Figure | None]
 FIGURES: dict[str, Draw] = {
     "figure4_markers": markers_figure,
     "figure5_angles": angles_figure,
@@ -48,7 +48,7 @@ def save_figures(
     folder: str | Path,
     formats: Sequence[str] = FORMATS,
     *,
-    comparison: Trial | None = None,
+    comparison: ComparedTrial | None = None,
     sensitivity: Sensitivity | None = None,
     failures: Failures | None = None,
 ) -> list[Path]:

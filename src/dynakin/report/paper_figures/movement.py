@@ -40,12 +40,12 @@ from dynakin.results.measures.sources import moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.units import COMPONENTS
 from dynakin.validation.differences import angle_differences, moment_differences
-from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
+from dynakin.validation.methods import AT, CLASSICAL, ComparedTrial, Method
 
 _PICTURES = 6
 
 
-def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+def markers_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure | None:
     """Figure 4: the stick figure and the markers, measured (hollow) and estimated (filled), over one cycle."""
     cycle = middle_cycle(estimate)
     frames = np.linspace(cycle.start, cycle.stop - 1, _PICTURES).astype(int)
@@ -87,7 +87,7 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
     return figure
 
 
-def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+def angles_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure | None:
     """Figure 5: every free coordinate with its band, right and left over each other, with the classical method's."""
     values, sd = estimate.known("coordinates"), estimate.values("coordinates_sd")
     joints = [joint for joint in joints_of(estimate) if np.any(sd[:, list(joint.columns.values())])]
@@ -131,7 +131,7 @@ def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
     return figure
 
 
-def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+def wrench_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure | None:
     """Figure 6: the wrench as measured, estimated, and from the table and classical angles ("AT")."""
     measured, estimated = (estimate.values(f"wrench_{kind}") for kind in ("measured", "estimated"))
     shown = [k for k in range(len(COMPONENTS)) if np.isfinite(estimated[:, k]).any()]
@@ -161,7 +161,7 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
     return figure
 
 
-def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+def knee_moment_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure | None:
     """Figure 7: the moment about each knee, estimated, and from the table and classical angles ("AT")."""
     moments, names = estimate.values("moments"), estimate.coordinate_names
     free = sorted(k for joint in joints_of(estimate) for k in joint.columns.values())
@@ -204,7 +204,7 @@ def middle_cycle(estimate: Estimate) -> slice:
     return slice(middle.first, middle.last + 1)
 
 
-def _reference(comparison: Trial | None, kind: str) -> Method | None:
+def _reference(comparison: ComparedTrial | None, kind: str) -> Method | None:
     methods = [] if comparison is None else comparison.of_kind(kind)
     return methods[0] if methods else None
 
@@ -252,7 +252,7 @@ def _key(
 _COLUMNS = 4
 
 
-def repetitions_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+def repetitions_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure | None:
     """Joint angles, moments and wrench over 0 to 100 % of a repetition: mean, and one standard deviation as a band."""
     curves = estimate_curves(estimate) if comparison is None else comparison.curves()
     plots = plots_by_method(estimate, curves)

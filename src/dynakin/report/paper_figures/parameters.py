@@ -14,14 +14,14 @@ from dynakin.report.styles import LIMIT, QUIET, thin
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import number, shown_unit, words
 from dynakin.results.records import Parameter
-from dynakin.validation.methods import Trial
+from dynakin.validation.methods import ComparedTrial
 
 _PANEL_IN = 2.35
 _LABEL_PT = 7.5
 _INERTIAS = {f"i{a}{b}": f"{a}{b}" for a, b in ("xx", "yy", "zz")}
 
 
-def lengths_and_masses_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+def lengths_and_masses_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure | None:
     """Figure 8: change of each segment's length and mass from its start, in per cent, with its band and bounds."""
     groups = {
         "Segment lengths": [p for p in estimate.parameters if p.kind == "length" and p.estimated],
@@ -30,7 +30,7 @@ def lengths_and_masses_figure(estimate: Estimate, comparison: Trial | None = Non
     return _figure(estimate, groups)
 
 
-def inertias_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+def inertias_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure | None:
     """Figure 9: change of each estimated moment of inertia, about the segment's origin, in per cent.
 
     Products of inertia start close to zero: a change in per cent of them says nothing, so they are left out.

@@ -18,7 +18,7 @@ from dynakin.results.measures.sources import moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.units import COMPONENTS
 from dynakin.validation.differences import AngleDifference, MomentDifference, angle_differences, moment_differences
-from dynakin.validation.methods import AT, CLASSICAL, Trial
+from dynakin.validation.methods import AT, CLASSICAL, ComparedTrial
 from dynakin.validation.reference.inverse_dynamics import INVERSE
 from dynakin.validation.table2 import Spread, table2
 
@@ -58,12 +58,12 @@ def methods_section(page: Page) -> Section | None:
     )
 
 
-def about_methods(trial: Trial) -> str:
+def about_methods(trial: ComparedTrial) -> str:
     """What the reference methods of a trial are."""
     return ABOUT_INVERSE if trial.of_kind(INVERSE) else ABOUT_METHODS
 
 
-def wrench_part(trial: Trial, key: str) -> Section:
+def wrench_part(trial: ComparedTrial, key: str) -> Section:
     """Figure 6: each modelled component as measured, by the filters and by AT."""
     reference = trial.reference(AT)
     methods = [*([reference] if reference else []), *trial.of_kind("EKF")]
@@ -83,7 +83,7 @@ def wrench_part(trial: Trial, key: str) -> Section:
     return Section(f"{key}-wrench", "Ground reaction by method", "", panels, lines=key_lines)
 
 
-def angle_part(trial: Trial, key: str) -> Section:
+def angle_part(trial: ComparedTrial, key: str) -> Section:
     """Figure 5: each coordinate by the filters and by the classical method."""
     reference = trial.reference(CLASSICAL)
     methods = [*trial.of_kind("EKF"), *([reference] if reference else [])]
@@ -108,7 +108,7 @@ def angle_part(trial: Trial, key: str) -> Section:
     )
 
 
-def moment_part(trial: Trial, key: str) -> Section:
+def moment_part(trial: ComparedTrial, key: str) -> Section:
     """Figure 7: joint moments by the filters and by AT, knees first, the other joints folded."""
     reference = trial.reference(AT)
     methods = [*trial.of_kind("EKF"), *([reference] if reference else [])]
@@ -144,7 +144,12 @@ PARTS = (wrench_part, angle_part, moment_part)
 
 
 def _overlaid(
-    trial: Trial, title: str, unit: str, lines: dict[str, np.ndarray], note: str, source: np.ndarray | None = None
+    trial: ComparedTrial,
+    title: str,
+    unit: str,
+    lines: dict[str, np.ndarray],
+    note: str,
+    source: np.ndarray | None = None,
 ) -> Panel:
     """Signals (T,) by method, the first at the bottom; a filter's shows where it comes from (T,)."""
     styles, drawn = _styles(trial), []
@@ -154,11 +159,11 @@ def _overlaid(
     return chart(title, unit, trial.time, drawn, note=note)
 
 
-def _styles(trial: Trial) -> dict[str, LineStyle]:
+def _styles(trial: ComparedTrial) -> dict[str, LineStyle]:
     return method_styles([MEASURED, *(method.name for method in trial.methods)])
 
 
-def _key(trial: Trial, names: Sequence[str]) -> tuple[LineStyle, ...]:
+def _key(trial: ComparedTrial, names: Sequence[str]) -> tuple[LineStyle, ...]:
     styles = _styles(trial)
     return tuple(styles[name] for name in names)
 

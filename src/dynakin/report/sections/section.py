@@ -16,7 +16,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import reported
 from dynakin.results.measures.mean_curves import MeanCurve, estimate_curves
 from dynakin.results.measures.repetitions import Found, repetitions_of
-from dynakin.validation.methods import Trial
+from dynakin.validation.methods import ComparedTrial
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Page:
 
     estimate: Estimate
     metrics: dict[str, Any]
-    comparison: Trial | None = None
+    comparison: ComparedTrial | None = None
 
     @cached_property
     def planar(self) -> bool:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
 from dynakin.model.definition import ModelDefinition
 from dynakin.model.markers.recognise import recognise
@@ -132,7 +132,7 @@ def landmark_paths(recording: Recording, initial: CalibratedModel, definition: M
         ModelError: the recording's markers fit no marker set.
     """
     match = recognise(recording, definition.marker_set).match
-    trial = Trial.of(recording, match, initial.ground)
+    trial = MarkedTrial.of(recording, match, initial.ground)
     sides = SIDES if initial.side == "both" else (initial.side,)
     finders = [
         LandmarkFinder(match, side, definition.subject.sex, initial.measured_plan().model.planar) for side in sides
@@ -142,7 +142,7 @@ def landmark_paths(recording: Recording, initial: CalibratedModel, definition: M
     return {name: np.mean([paths[name] for paths in each if name in paths], axis=0) for name in names}
 
 
-def _one_side(finder: LandmarkFinder, trial: Trial) -> dict[str, Array]:
+def _one_side(finder: LandmarkFinder, trial: MarkedTrial) -> dict[str, Array]:
     names = [name for name in finder.match.marker_set.landmarks if finder.known(name)]
     paths = {name: np.full((trial.recording.n_frames, 3), np.nan) for name in names}
     for frame in range(trial.recording.n_frames):
