@@ -1,0 +1,123 @@
+"""Which foot each plate carries at this moment, by what has been seen of stance and press so far."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.recordings.feet.contact import ALONE_M, NEAR_M
+from dynakin.recordings.feet.sharing import BETWEEN_M, SHORTEST_S, beside_m, lies_between, mostly
+from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
+from dynakin.stream.stances import LiveStances
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+
+class PlateOwners:
+    """A plate is that foot's whose markers its force acts under in most of the frames of a stance, and both feet's
+    where it presses between them, as offline (`recordings.feet.assignment`). A stance that no plate has carried yet is
+    off the plates.
+
+    Args:
+        feet, plates: how many. assigned: plate -> foot, where it is known. given: plates of declared contacts.
+    """
+
+    def __init__(self, feet: int, plates: int, assigned: dict[int, int], given: list[int]) -> None:
+        self._assigned, self._given = assigned, given
+        self._near, self._loaded = (np.zeros((feet, plates), dtype=int) for _ in range(2))  # frames of this stance
+        self._between, self._judged = np.zeros(plates, dtype=int), np.zeros(plates, dtype=int)  # frames of this press
+        self._beside = np.full(plates, np.inf)  # since when it presses between two soles
+        self._shared = np.zeros((feet, plates), dtype=bool)  # it has, since this foot stands and this plate is pressed
+        self._under, self._owners = (np.zeros((feet, plates), dtype=bool) for _ in range(2))
+
+    @property
+    def owners(self) -> Flags:
+        """(F, P) of the plates that are pressed."""
+        return self._owners
+
+    @property
+    def carried(self) -> Flags:
+        """(F,) feet under which a plate is loaded."""
+        return np.asarray((self._owners | self._under).any(axis=1))
+
+    def look(self, plates: list[GroundPlate], stances: LiveStances, bears: Flags) -> Flags:
+        """(F,) feet that bear on no plate, at the next moment.
+
+        Args:
+            bears: (F,) feet that may bear.
+        """
+        self._near[~bears], self._loaded[~bears] = 0, 0
+        if not plates:
+            self._owners[:] = False
+            return bears
+        self._assign(plates, stances, bears)
+        loaded = np.array([plate.loaded[0] for plate in plates])
+        return np.asarray(bears & ~(self._majority() | (self._owners & loaded)).any(axis=1))
+
+    def _assign(self, plates: list[GroundPlate], stances: LiveStances, bears: Flags) -> None:
+        touches, outlines = stances.stands, stances.outlines
+        cops = np.concatenate([plate.cop for plate in plates])
+        F, P = len(bears), len(plates)
+        away = distance_to_hull(np.tile(cops, (F, 1)), np.repeat(outlines, P, axis=0)).reshape(F, P)
+        away = np.where(np.isnan(away), np.inf, away)  # of a plate that is not loaded
+        near = away < NEAR_M
+        alone = touches[:, None] & (away < ALONE_M)  # who stands on one leg holds the other foot beside it
+        self._under = near & (alone.sum(axis=0) == alone)
+        loaded = np.array([plate.loaded[0] for plate in plates])
+        self._shared[:, self._press_between(plates, cops, stances, bears, away)] = True
+        self._shared &= bears[:, None] & np.array([plate.pressed[0] for plate in plates])
+        shared = self._shared | (bears[:, None] & mostly(self._between, self._judged))
+        for p, foot in self._assigned.items():
+            near[:, p] = np.arange(F) == foot
+        near[:, self._given] = shared[:, self._given] = False
+        self._loaded += touches[:, None] & loaded
+        self._near += touches[:, None] & loaded & near
+        mine = self._majority() & bears[:, None]
+        for p, plate in enumerate(plates):
+            push = float(plate.wrench[0, 1])
+            if push <= UNLOADED_N:
+                self._owners[:, p] = False
+                self._between[p] = self._judged[p] = 0
+            elif p in self._assigned:
+                self._owners[:, p] = near[:, p]
+            elif (mine | shared)[:, p].any():
+                self._owners[:, p] = (mine | shared)[:, p]
+            elif not self._owners[:, p].any():  # a foot that sets down, before it stands
+                nearest = int(np.argmin(away[:, p]))
+                self._owners[nearest, p] = bool(near[nearest, p] and stances.low[nearest])
+
+    def _majority(self) -> Flags:
+        """(F, P) plates that carry a stance, as far as it has gone."""
+        return np.asarray(mostly(self._near, self._loaded))
+
+    def _press_between(
+        self, plates: list[GroundPlate], cops: Array, stances: LiveStances, bears: Flags, away: Array
+    ) -> Flags:
+        """(P,) plates that have pressed under neither sole of two feet that may bear, for `SHORTEST_S`; counts frames
+        of their presses, and those of them that lie between the markers of two flat feet (`Sharing`).
+
+        Args:
+            away: (F, P) m from the markers of each foot, whose sole is no further away.
+        """
+        push, nearest = np.concatenate([plate.push for plate in plates]), away.min(axis=0)
+        judged, beside = push > JUDGED_N, beside_m(push)
+        self._judged += judged
+        under_neither, between = np.isfinite(nearest) & (nearest > beside), judged & (nearest > BETWEEN_M)
+        if len(bears) != 2 or not bears.all() or not stances.marked.all():
+            under_neither[:] = between[:] = False
+        if under_neither.any():
+            soles = [shape.reach(stances.outline(f)) for f, shape in enumerate(stances.shapes)]
+            corners = [np.repeat(sole, len(plates), axis=0) for sole in (*soles, np.concatenate(soles, axis=1))]
+            *each, within = (distance_to_hull(cops, sole) for sole in corners)
+            under_neither &= lies_between(each, within, beside)
+        between &= stances.flat.all()
+        if between.any():
+            markers = stances.outlines.reshape(1, -1, 2)
+            both = np.broadcast_to(markers, (len(plates), *markers.shape[1:]))
+            between &= lies_between(away, distance_to_hull(cops, both), BETWEEN_M)
+        self._between += between
+        self._beside = np.where(under_neither, np.fmin(self._beside, stances.time_s), np.inf)
+        return np.asarray(stances.time_s - self._beside >= SHORTEST_S)
