@@ -105,7 +105,7 @@ def find_locks(
             text = (
                 f"the {name} is seen by {one} and {other} alone, and turns unseen about the line between them: its "
                 "tilt and the hips' flexion follow from the legs, which may have them 10 deg off, more than their "
-                "deviations say. A third marker would show them, on the back of the pelvis."
+                "deviations say. A third marker of the pelvis, away from that line, would show them."
             )
             messages.append(warning("angles", text))
         if count or all(locks.get(axis.coordinate) is not None for axis in segment.axes):
