@@ -17,7 +17,7 @@ from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates
 from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes, usual_sizes
 from dynakin.filter.in_hands import HANDS, Hands
-from dynakin.filter.joint_errors import SKIN_ANGLE_RAD, JointErrors
+from dynakin.filter.joint_errors import JointErrors
 from dynakin.filter.reported_sd import (
     BLOCKS,
     OWN_AT_ONCE,
@@ -28,8 +28,10 @@ from dynakin.filter.reported_sd import (
     movement_intensity,
     reported,
 )
-from dynakin.filter.systematic import _STEP_S, COMMON, ROOT_SKIN, Systematic
+from dynakin.filter.systematic import _STEP_S, ROOT_SKIN, Systematic
 from dynakin.model.calibration.declared import with_loads
+from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
+from dynakin.model.state_priors import COMMON_SKIN
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
 from dynakin.settings.noise import Noise
 from dynakin.settings.subject import CarriedLoad
@@ -219,7 +221,7 @@ def test_skin_that_follows_the_knee_is_that_of_displaced_markers() -> None:
         for k, (_, coordinates) in enumerate(drives.items()):
             for c in coordinates:
                 own, common = rng.standard_normal((4, 3)), rng.standard_normal(3)
-                d[4 * k : 4 * k + 4] += s[c] * (np.sqrt(1.0 - COMMON) * own + np.sqrt(COMMON) * common)
+                d[4 * k : 4 * k + 4] += s[c] * (np.sqrt(1.0 - COMMON_SKIN) * own + np.sqrt(COMMON_SKIN) * common)
         d[:4] *= ROOT_SKIN
         d *= DECLARED[:, None] * weight
         draws.append(np.linalg.solve(J.T @ J + 4.0 * np.eye(10), J.T @ d.ravel()))
@@ -513,7 +515,7 @@ def test_inertia_that_small_innovations_leave_open_is_known_by_the_declared_nois
 def test_the_scale_of_systematic_errors_is_that_of_joints_and_skin() -> None:
     """What is not known of inertia has no usual size: another scale leaves it."""
     subject, x = with_inertia()
-    subject.plan = SimpleNamespace()  # joints found from markers
+    subject.plan = SimpleNamespace(sites=())  # joints found from markers
     P = np.zeros((34, 34))
     P[30:, 30:] = 0.01 * np.eye(4)
     own = {block: np.zeros(10) for block in ("coordinates", "speeds", "accelerations", "moments")}

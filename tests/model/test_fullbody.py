@@ -9,6 +9,7 @@ import pytest
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.filter.error_sizes import LANDMARKS, SINCE_CENTRE, less_sure_joints
 from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.contact import SHARED_PLATE
@@ -113,6 +114,33 @@ def squat(time: np.ndarray) -> dict[str, np.ndarray]:
     motion = {f"{name}_{side}": np.deg2rad(deg) * depth for side in "rl"
               for name, deg in (("knee_angle", 60.0), ("hip_flexion", 55.0), ("ankle_angle", 20.0))}  # fmt: skip
     return motion | {"pelvis_ty": -0.10 * depth, "pelvis_tilt": np.deg2rad(-10.0) * depth}
+
+
+def test_skin_that_never_comes_back_to_where_it_was_measured_leaves_places_less_known() -> None:
+    """A squat comes back to standing; its bottom alone does not, and feet stay where they were."""
+    initial = measured()
+    time = np.arange(200) / RATE
+    x = states(initial, squat(time), 0.0, np.zeros(3), time)
+
+    def since(frames: slice) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+        trial = recording_of(initial, x[frames], time[frames], plates=False, noise_m=0.0005)
+        found = definition().calibrate(trial, ground=LABORATORY, static=standing())
+        sd = dict(zip(found.names, found.sd0.tolist(), strict=True))
+        sites = found.measured_plan().sites
+        centres = less_sure_joints(found)
+        return {s.segment: s.since_m for s in sites}, {s.segment: sd[f"marker/{s.name}/x"] for s in sites}, centres
+
+    whole, bottom = since(slice(None)), since(slice(80, 120))
+    assert not any(whole[0].values()) and not whole[2]
+    turned = np.tanh(np.deg2rad([55.0 * 0.95 - 15.0, 60.0 * 0.95 - 15.0]) / np.deg2rad(50.0))
+    declared = next(s.soft_tissue_m for s in initial.measured_plan().sites if s.segment == "thigh_r")
+    assert bottom[0]["thigh_r"] == pytest.approx(declared * np.sqrt(np.mean(turned**2)), rel=0.1)
+    assert bottom[1]["thigh_r"] == pytest.approx(np.hypot(whole[1]["thigh_r"], bottom[0]["thigh_r"]), rel=1e-6)
+    assert bottom[0]["head"] == 0.0
+    assert bottom[0]["foot_r"] < 0.2 * bottom[0]["thigh_r"]
+    skin_m = np.hypot(bottom[0]["thigh_r"], bottom[0]["shank_r"])
+    assert bottom[2]["shank_r"] == pytest.approx(np.hypot(1.0, SINCE_CENTRE * skin_m / LANDMARKS.hinge_centre))
+    assert "head" not in bottom[2]
 
 
 def test_the_filter_follows_a_moving_body_at_any_heading_without_knowing_which() -> None:

@@ -103,6 +103,9 @@ with 25 kg more on the trunk and twice the skin (`docs/validation/deviations.md`
 ONE_SIDED = 0.010 / LANDMARKS.hinge_centre
 """Times as far off as others is the centre of a knee or ankle with a lateral marker alone and no width that somebody
 measured (`docs/validation/geometry.md`)."""
+SINCE_CENTRE = 0.5
+"""How far off the centre of a joint may be by skin of its two segments that never comes back to where the standing
+trial has it, of that skin's way (`Site.since_m`)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
     ball_centre=0.0016,
@@ -142,4 +145,11 @@ def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:
     if calibrated.unmarked_joints:  # all are said to be as unsure
         return {}
     turns = angles_of(calibrated.one_sided_joints)
-    return {s.name: ONE_SIDED for s in calibrated.spec.segments if turns & {axis.coordinate for axis in s.axes}}
+    found = {s.name: ONE_SIDED for s in calibrated.spec.segments if turns & {axis.coordinate for axis in s.axes}}
+    since = {site.segment: site.since_m for site in calibrated.plan.sites} if calibrated.plan else {}
+    for segment in calibrated.spec.segments:
+        skin_m = np.hypot(since.get(segment.name, 0.0), since.get(segment.parent, 0.0))
+        factor = np.hypot(found.get(segment.name, 1.0), SINCE_CENTRE * skin_m / LANDMARKS.hinge_centre)
+        if factor > 1.0:
+            found[segment.name] = float(factor)
+    return found

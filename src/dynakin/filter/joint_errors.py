@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
 from dynakin.model.calibration.pose_start import bare
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.spec import free_coordinates, free_names
@@ -207,10 +208,6 @@ def _root_turned(name: str, R_B: Array, children: Sequence[_core.SegmentSpec], e
 def _along(segment: str, place: str, R: Array, vector: Array) -> Column:
     """A vector of ground axes as displacements of three of the errors' coordinates whose axes are R's columns."""
     return dict(zip(_names(segment, place), (R.T @ vector).tolist(), strict=True))
-
-
-SKIN_ANGLE_RAD = np.radians(50.0)
-"""How far a joint turns until its skin has moved three quarters of its way."""
 
 
 def followed(q: Array, calibrated: CalibratedModel) -> Array:

@@ -20,13 +20,15 @@ from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates, wrenches_of
 from dynakin.filter.error_sizes import KINDS, OF_JOINTS, Sizes, less_sure_joints, usual_sizes
 from dynakin.filter.in_hands import Hands
-from dynakin.filter.joint_errors import SKIN_ANGLE_RAD, JointErrors, drives, floats, neutral, rolls
+from dynakin.filter.joint_errors import JointErrors, drives, floats, neutral, rolls
 from dynakin.filter.limbs import unseen_limbs, unsure_moments
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.filter.reported_sd import BLOCKS, Parts, as_believed, movement_intensity, reported
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
 from dynakin.model.spec import free_coordinates
+from dynakin.model.state_priors import COMMON_SKIN
 from dynakin.recordings.times import step_of
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import in_use, moment_sources, plates_refused
@@ -45,8 +47,6 @@ own skeleton, 2.3 to 3.2 with one scaled by hand."""
 ROOT_SKIN = 4.0
 """Times as much skin as elsewhere counts on the segment that floats (the pelvis): what its markers do together no other
 segment contradicts. By `truth3d` its rotation was said to a third of its error (0.18 of 0.53 deg in walks)."""
-COMMON = 0.36
-"""Part of that displacement's variance that all markers of a segment share."""
 SAMPLE_S = 0.1
 """Frames of a recording further apart than this are worked out, variances of those between by straight lines."""
 _STEP_S = 0.005
@@ -203,7 +203,7 @@ class Systematic:
     def _displaced(self, values: Array) -> Array:
         """(., 3 M + 3 S): effects of each marker's own share of the displacement and of each segment's common one."""
         own = values * self._declared
-        return np.hstack([np.sqrt(1.0 - COMMON) * own, np.sqrt(COMMON) * own @ self._members])
+        return np.hstack([np.sqrt(1.0 - COMMON_SKIN) * own, np.sqrt(COMMON_SKIN) * own @ self._members])
 
     def _by_inertia(self, x: Array, covariance: Array, external: Array) -> Array:
         """(C,) variances of moments by inertia of this covariance (I, I)."""

@@ -240,7 +240,7 @@ class ModelDefinition:
             messages=tuple(messages),
             plan=plan,
             foot_markers=rest.trial.match.foot_markers,
-            feet={s.side: s.name for s in plan.model.segments if s.side is not None and "foot" in s.parts},
+            feet=plan.model.feet,
             unmarked_kg=unmarked_kg,
             held=held,
             joint_prior=plan.joint_prior(priors),

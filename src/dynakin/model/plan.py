@@ -55,6 +55,7 @@ class Site:
     position: Array  # (3,) m, segment frame
     variance: float  # m^2
     soft_tissue_m: float  # declared size of the displacement of skin and flesh
+    since_m: float = 0.0  # how far skin lies, in all of the trial, from where the standing trial has it
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +123,8 @@ class ModelPlan:
         names = [f"inertia/{name}/{each}" for name in self.inertia for each in INERTIA_NAMES]
         blocks = [inertia_covariance(body, self.reach[name], priors, worn_kg) for name, body in self.inertia.items()]
         places = {site.name: site.position for site in self.sites}
-        placed = places_prior(places, {site.name: site.segment for site in self.sites}, priors)
+        since = {site.name: site.since_m for site in self.sites}
+        placed = places_prior(places, {site.name: site.segment for site in self.sites}, priors, since)
         return JointPrior(tuple(names), block_diag(*blocks)).with_known(placed)
 
     def bounds(self, bounds: Bounds, priors: Priors | None = None) -> dict[str, Interval]:

@@ -228,6 +228,11 @@ class ModelFile(Strict):
     segments: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=_MOST)]
 
     @property
+    def feet(self) -> dict[str, str]:
+        """ "right", "left" -> segment on which the ground acts."""
+        return {s.side: s.name for s in self.segments if s.side is not None and "foot" in s.parts}
+
+    @property
     def sided(self) -> bool:
         """Whether right and left limbs are modelled apart."""
         return any(segment.side is not None for segment in self.segments)

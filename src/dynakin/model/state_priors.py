@@ -18,6 +18,8 @@ Array = npt.NDArray[np.float64]
 _SDS = 4.0
 """Half width of the bounds of what has a standard deviation of its own: the +-20 % of a length are as much of its."""
 _POSITIVE = frozenset({"mass", "ixx", "iyy", "izz"})
+COMMON_SKIN = 0.36
+"""Part of the variance of its skin's displacement that all markers of a segment share."""
 _LEAST_SHARE = 0.1  # of the table's value: a segment is not left without mass
 
 
@@ -113,14 +115,24 @@ def inertia_covariance(body: RigidBody, length: float, priors: Priors, worn_kg: 
     return np.asarray(np.diag(sd**2) + worn_kg**2 * np.outer(per_kg, per_kg))
 
 
-def places_prior(places: Mapping[str, Array], segment_of: Mapping[str, str], priors: Priors) -> JointPrior:
-    """Of markers' places (3,) on their segments: those of a segment together (`cluster_covariance`)."""
+def places_prior(
+    places: Mapping[str, Array],
+    segment_of: Mapping[str, str],
+    priors: Priors,
+    since_m: Mapping[str, float] | None = None,
+) -> JointPrior:
+    """Of markers' places (3,) on their segments: those of a segment together (`cluster_covariance`).
+
+    Args:
+        since_m: standard deviation of the way that each marker's skin has gone since it was measured.
+    """
     names: list[str] = []
     blocks: list[Array] = []
     for segment in dict.fromkeys(segment_of.values()):
         own = [name for name in places if segment_of[name] == segment]
         names += [f"marker/{name}/{axis}" for name in own for axis in "xyz"]
-        blocks.append(cluster_covariance(np.array([places[name] for name in own]), priors))
+        block = cluster_covariance(np.array([places[name] for name in own]), priors)
+        blocks.append(block + _moved_covariance(np.array([(since_m or {}).get(name, 0.0) for name in own])))
     return JointPrior(tuple(names), block_diag(*blocks))
 
 
@@ -133,6 +145,12 @@ def cluster_covariance(places: Array, priors: Priors) -> Array:
     turns = np.cross(np.eye(3), (places - places.mean(axis=0))[:, None]).swapaxes(1, 2).reshape(-1, 3)
     together = np.hstack([priors.cluster_shift_sd_m * shifts, np.deg2rad(priors.cluster_turn_sd_deg) * turns])
     return np.asarray(together @ together.T + priors.cluster_marker_sd_m**2 * np.eye(len(shifts)))
+
+
+def _moved_covariance(since_m: Array) -> Array:
+    """Covariance (3 M, 3 M) of how far skin has moved under M markers of a segment, in part together."""
+    shared = COMMON_SKIN * np.outer(since_m, since_m) + (1.0 - COMMON_SKIN) * np.diag(since_m**2)
+    return np.asarray(np.kron(shared, np.eye(3)))
 
 
 def inertia_prior(body: RigidBody, length: float, priors: Priors) -> dict[str, float]:

@@ -19,6 +19,8 @@ from dynakin.arrays import rms
 from dynakin.recordings.recording import Array
 
 _FEWEST = 3
+SKIN_ANGLE_RAD = np.radians(50.0)
+"""How far a joint turns until its skin has moved three quarters of its way."""
 
 
 @dataclass(frozen=True, eq=False)
