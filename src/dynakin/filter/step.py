@@ -157,21 +157,25 @@ def step_estimate(
     report: _core.StepReport | None,
     sources: Codes,
     feet: _core.ContactLoads | None = None,
+    *,
+    by_plates: bool = False,
 ) -> StepEstimate:
     """Everything that a state x (n,) says of its frame; with one frame of feet the moments that these leave.
 
     Args:
-        sources: (C,) codes of the moments; what is absent becomes NaN.
+        sources: (C,) codes of the moments; what is absent becomes NaN. by_plates: whether plates measure all of the
+            feet, of which the last is the residual: their sum is the total wrench then.
     """
     q, qd, qdd = _core.coordinates(model, x)
-    moments = _core.joint_moments(model, x) if feet is None else _core.contact_moments(model, x, feet)["moments"]
+    found = {} if feet is None else _core.contact_moments(model, x, feet)
+    moments = found["moments"] if found else _core.joint_moments(model, x)
     values = {
         "coordinates": q,
         "speeds": qd,
         "accelerations": qdd,
         "moments": np.where(sources == ABSENT, np.nan, moments),
         "moment_sources": sources,
-        "wrench": _core.wrench(model, x),
+        "wrench": found["foot_wrench"][:-1].sum(axis=0) if by_plates else _core.wrench(model, x),
         "markers": _core.marker_positions(model, x),
     }
     return StepEstimate(time_s, values, labels, report)
