@@ -186,9 +186,10 @@ def _with_total(data: xr.Dataset, feet: ContactLoads) -> xr.Dataset:
     measured = feet.by_plates[:, None] & (wrench_sources(data) == MEASURED)
     needed, sd = values_of(data, "wrench_estimated"), values_of(data, "wrench_sd")
     given = needed - values_of(data, "wrench_remainder")
+    given_sd = np.fmin(feet.plates_sd(), values_of(data, "foot_wrench_sd")[:, :-1].sum(axis=1))
     found = {
         "wrench_estimated": np.where(measured, given, needed),
-        "wrench_sd": np.where(measured, feet.plates_sd(), sd),
+        "wrench_sd": np.where(measured, given_sd, sd),
         "wrench_needed": needed,
     }
     return data.assign({name: (("time", "component"), values) for name, values in found.items()})

@@ -153,8 +153,8 @@ class ContactLoads:
         return np.asarray(measured & self.known)
 
     def plates_sd(self) -> Array:
-        """(T, 6) of the contacts' sum as plates measure it, without the residual: no less than the filter leaves of it,
-        which knows what is needed at least as well as the sum with the residual."""
+        """(T, 6) of the contacts' sum as plates measure it, without the residual: the filter leaves no more of it, as it
+        knows what is needed at least as well as the sum with the residual (docs/derivations.md, section 15)."""
         names = [name for name in self.names if name != RESIDUAL]
         own = slice(0, 6 * len(names))
         plates = replace(

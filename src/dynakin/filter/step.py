@@ -182,12 +182,17 @@ def step_estimate(
 
 
 def deviations_of(
-    model: _core.Model, x: Array, covariance: Array, feet: _core.ContactLoads | None = None
+    model: _core.Model,
+    x: Array,
+    covariance: Array,
+    feet: _core.ContactLoads | None = None,
+    plates_sd: Array | None = None,
 ) -> dict[str, Array]:
     """Standard deviations of a state's outputs: J P J' for moments and wrench.
 
     Args:
         x: (n,). covariance: (n, n). feet: one frame, whose wrenches the moments come from; NaN where these are unknown.
+            plates_sd: (6,) of their sum where plates measure all of it (`ContactLoads.plates_sd`).
 
     Returns:
         coordinates, speeds, accelerations, moments (C,), 0 where a coordinate is locked (not its moment); wrench (6,).
@@ -199,11 +204,14 @@ def deviations_of(
         offset, size = model.layout.blocks[name]
         found[name] = np.zeros(len(model.coordinate_names))
         found[name][free] = np.sqrt(variance[offset : offset + size])
+    found["wrench"] = _propagated(_core.wrench_jacobian(model, x), covariance)
     if feet is None:
         found["moments"] = _propagated(_core.moment_jacobian(model, x), covariance)
     else:
-        found["moments"] = _core.contact_moments(model, x, feet, 0, covariance)["moments_sd"]
-    found["wrench"] = _propagated(_core.wrench_jacobian(model, x), covariance)
+        by_feet = _core.contact_moments(model, x, feet, 0, covariance)
+        found["moments"] = by_feet["moments_sd"]
+        if plates_sd is not None:
+            found["wrench"] = np.fmin(plates_sd, by_feet["foot_wrench_sd"][:-1].sum(axis=0))
     return found
 
 

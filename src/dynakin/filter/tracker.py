@@ -239,19 +239,17 @@ class Tracker:
             lag = self._with_lag()
             step, state, covariance = self._delayed_step(lag), lag.state, lag.covariance
         loads = step and step.loads
-        found = deviations_of(self.core_model, state, covariance, loads)
+        found = deviations_of(self.core_model, state, covariance, loads, step and step.plates_sd)
         if step is not None and step.unmeasured:
             found["moments"] = np.where(step.sources != MEASURED, prior_factor(self.noise), 1.0) * found["moments"]
             found["wrench"] = (prior_factor(self.noise) if step.blind else 1.0) * found["wrench"]
-        if step is not None and step.plates_sd is not None:
-            found["wrench"] = step.plates_sd
         if self.systematic is not None:
             wrench, rate = np.zeros((0, 6)), None
             if step is not None and step.loads is not None:
                 wrench = _core.contact_moments(self.core_model, state, step.loads)["foot_wrench"]
                 rate = self._wrench_rate(step, state, wrench)
                 if step.plates_sd is not None and rate is not None:
-                    found["wrench"] = np.hypot(step.plates_sd, self.systematic.sizes.clock * rate[:-1].sum(axis=0))
+                    found["wrench"] = np.hypot(found["wrench"], self.systematic.sizes.clock * rate[:-1].sum(axis=0))
             segments = () if step is None else step.segments
             sources, used = (None, None) if step is None else (step.sources, step.used)
             if step is not None and not step.unmeasured:  # what is derived has refused plates

@@ -160,8 +160,8 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
         np.hstack(columns) if columns else np.empty((len(estimate.time), 0)),
         in_degrees=True,
         notes=[
-            "One standard deviation: the filter's, with what is not known of joints and of skin that follows them; the "
-            "zero of an angle is not in it. Degrees, metres, seconds, N, N m.",
+            "One standard deviation: the filter's, with what is not known of joints, of skin that follows them and of "
+            "the plates' clock; the zero of an angle is not in it. Degrees, metres, seconds, N, N m.",
             "Of moments and feet's forces that are derived or a prior too (moments_source.sto, feet_source.sto); nan "
             "where absent.",
         ],
