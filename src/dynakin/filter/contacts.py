@@ -153,7 +153,7 @@ class ContactLoads:
         return np.asarray(measured & self.known)
 
     def plates_sd(self) -> Array:
-        """(T, 6) of the contacts' sum as plates measure it, without the residual: the filter leaves no more of it, as it
+        """(T, 6) of the contacts' sum as plates measure it, without the residual. The filter leaves no more of it: it
         knows what is needed at least as well as the sum with the residual (docs/derivations.md, section 15)."""
         names = [name for name in self.names if name != RESIDUAL]
         own = slice(0, 6 * len(names))
