@@ -30,6 +30,7 @@ from dynakin.filter.reported_sd import (
 )
 from dynakin.filter.systematic import _STEP_S, COMMON, ROOT_SKIN, Systematic
 from dynakin.model.calibration.declared import with_loads
+from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
 from dynakin.settings.noise import Noise
 from dynakin.settings.subject import CarriedLoad
@@ -710,3 +711,7 @@ def test_a_clock_that_is_off_counts_in_what_contacts_give_as_in_moments() -> Non
         np.testing.assert_allclose(found["wrench_sd"][:3], np.tile(np.hypot(4.0, clock_s * 1.5 * RATE), (3, 1)))
         np.testing.assert_array_equal(found["wrench_sd"][3], np.full(6, 4.0))  # derived: no plate's clock is in it
     assert (after["moments_sd"][:, 9] > before["moments_sd"][:, 9]).all()
+    beside = data.assign(foot_contact=(("time", "foot"), np.array([[1, UNMEASURED]] * 4, np.uint8)))
+    found = systematic().with_ground(0.008).added_over_time(beside, late=True)["foot_wrench_sd"]
+    np.testing.assert_array_equal(found[:, 0], after["foot_wrench_sd"][:, 0])
+    np.testing.assert_array_equal(found[:, 1], np.full((4, 6), 3.0))

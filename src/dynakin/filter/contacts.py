@@ -235,11 +235,13 @@ def rates(wrench: Array, time: Array) -> Array:
 
 def late_by(data: xr.Dataset, clock_sd_s: float) -> dict[str, Any]:
     """Deviations of the contacts' wrenches, and of their sum where that is measured, with a clock of the plates that is
-    off by so much: what acts later is off by that times its change, as in moments."""
+    off by so much: what acts later is off by that times its change, as in moments. No plate's clock is in what none
+    measures."""
     time = np.asarray(data["time"].values)
     found: dict[str, Any] = {}
     if "foot_wrench_sd" in data:
-        late = clock_sd_s * rates(wrenches_of(data)[0], time)
+        unmeasured = (values_of(data, "foot_contact") == UNMEASURED)[..., None]
+        late = clock_sd_s * rates(np.where(unmeasured, np.nan, values_of(data, "foot_wrench")), time)
         found["foot_wrench_sd"] = (("time", "foot", "component"), np.hypot(values_of(data, "foot_wrench_sd"), late))
     if "wrench_sd" in data:
         late = clock_sd_s * rates(values_of(data, "wrench_estimated"), time)
