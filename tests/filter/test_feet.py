@@ -14,8 +14,8 @@ import xarray as xr
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.assemble import assemble
-from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.tracker import smoothed
+from dynakin.filter.contacts import RESIDUAL, ContactLoads
+from dynakin.filter.core_filter import smoothed
 from dynakin.pipeline.result import Result
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.formats.mot import read_table
@@ -282,3 +282,46 @@ def test_feet_that_do_not_fit_are_told(data: Trial) -> None:
     blank = replace(good, wrench=good.wrench * np.nan)
     with pytest.raises(ModelError, match="contact 'left': in frame 1 its wrench is"):
         blank.check(model)
+
+
+def with_residual(data: Trial) -> ContactLoads:
+    """With what the model does not explain as a contact of its own, on the root."""
+    feet = feet_of(data, contacts())
+    codes = np.column_stack([contacts(), np.full(FRAMES, ON_PLATE, np.uint8)])
+    wrench = np.concatenate([feet.wrench, np.zeros((FRAMES, 1, 6))], axis=1)
+    sd = np.array([5.0, 5.0, 15.0])[:, None]
+    points = np.vstack([REFERENCE, [0.0, 1.0, 0.0]])
+    return ContactLoads.of((*NAMES, RESIDUAL), (*FEET, SPEC.segments[0].name), wrench, codes, sd, 0.4 * sd, points)
+
+
+def test_the_total_is_what_contacts_give_where_plates_measure_all(data: Trial) -> None:
+    feet = with_residual(data)
+    estimate = estimate_of(data, feet, smooth=True)
+    by_plates, elsewhere = np.r_[0:25, 35:40, 45:FRAMES], np.r_[25:35, 40:45]
+    np.testing.assert_array_equal(np.flatnonzero(feet.by_plates), by_plates)
+    total, needed, sd = (values(estimate, name) for name in ("wrench_estimated", "wrench_needed", "wrench_sd"))
+    given, remainder = values(estimate, "foot_wrench").sum(axis=1), values(estimate, "wrench_remainder")
+    np.testing.assert_allclose(total[by_plates], given[by_plates], atol=1e-9)
+    np.testing.assert_allclose(needed, given + remainder, atol=1e-9)
+    assert np.abs(remainder[by_plates]).max() > 1.0
+    np.testing.assert_array_equal(total[elsewhere], needed[elsewhere])
+    own = values(estimate, "foot_wrench_sd")
+    both = np.r_[0:20, 45:FRAMES]  # two feet of 5 N each, none of the residual's 15
+    expected = np.minimum(np.sqrt(2.0) * 5.0, own[both][..., :3].sum(axis=1))
+    np.testing.assert_allclose(sd[both][:, :3], expected)
+    np.testing.assert_allclose(sd[20:25], own[20:25, 0])  # the left foot alone
+    assert (sd[35:40] == 0.0).all()  # in the air
+    assert not feet_of(data, contacts()).by_plates.any()  # without a residual what is needed is what contacts give
+
+
+def test_how_well_plates_and_movement_agree_is_by_what_the_movement_needs(data: Trial, tmp_path: Path) -> None:
+    estimate = estimate_of(data, with_residual(data), smooth=True)
+    metrics = compute_metrics(estimate)
+    window = estimate.time >= metrics["window"]["start_s"]
+    off = (values(estimate, "wrench_measured") - values(estimate, "wrench_needed"))[window]
+    np.testing.assert_allclose(list(metrics["wrench"]["rms"].values()), np.sqrt(np.mean(off**2, axis=0)), rtol=1e-9)
+    table = read_table(Result(estimate).save(tmp_path) / "wrench.sto")
+    columns = dict(zip(table.names, table.values.T, strict=True))
+    found = (columns["fy_measured"] - columns["fy_needed"])[window]
+    assert np.sqrt(np.mean(found**2)) == pytest.approx(metrics["wrench"]["rms"]["fy"], rel=1e-4)
+    np.testing.assert_allclose(columns["fy_estimated"], values(estimate, "wrench_estimated")[:, 1], rtol=1e-4)

@@ -32,6 +32,7 @@ from dynakin.filter.systematic import _STEP_S, ROOT_SKIN, Systematic
 from dynakin.model.calibration.declared import with_loads
 from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
 from dynakin.model.state_priors import COMMON_SKIN
+from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
 from dynakin.settings.noise import Noise
 from dynakin.settings.subject import CarriedLoad
@@ -679,3 +680,40 @@ def test_a_load_in_the_hands_counts_in_the_moments_that_bear_it() -> None:
     state: tuple[Any, ...] = (own_sd, x, np.zeros((len(x), len(x))), np.zeros((0, 6)), [])
     without, held = (each.added(*state, late=True)["moments"] for each in (subject, with_it))
     np.testing.assert_allclose(held[inner] ** 2 - without[inner] ** 2, 9.0 * borne[inner], atol=1e-9)
+
+
+def test_a_clock_that_is_off_counts_in_what_contacts_give_as_in_moments() -> None:
+    """A load that comes on 8 ms later than it did is off by 8 ms of its change, in the foot's wrench and in the sum."""
+    time = 0.01 * np.arange(4.0)
+    wrench = CONTACT + time[:, None, None] * RATE
+    wrench = np.concatenate([wrench, 0.5 * wrench], axis=1)
+    per_coordinate, per_contact = ("time", "coordinate"), ("time", "foot", "component")
+    state = np.tile(with_motion(calibrated().x0), (4, 1))
+    data = xr.Dataset(
+        {f"{block}_sd": (per_coordinate, np.full((4, 10), 0.1)) for block in BLOCKS}
+        | {
+            "moments": (per_coordinate, np.zeros((4, 10))),
+            "state": (("time", "element"), state),
+            "state_sd": (("time", "element"), np.zeros_like(state)),
+            "final_covariance": (("element", "element_"), np.zeros((state.shape[1],) * 2)),
+            "markers_measured": (("time", "marker", "axis"), np.zeros((4, 12, 3))),
+            "foot_contact": (("time", "foot"), np.ones((4, 2), np.uint8)),
+            "foot_wrench": (per_contact, wrench),
+            "foot_wrench_sd": (per_contact, np.full((4, 2, 6), 3.0)),
+            "wrench_measured": (("time", "component"), np.where(time[:, None] < 0.03, wrench.sum(axis=1), np.nan)),
+            "wrench_estimated": (("time", "component"), wrench.sum(axis=1)),
+            "wrench_sd": (("time", "component"), np.full((4, 6), 4.0)),
+        },
+        coords={"time": time, "foot_segment": ("foot", ["shank", "pelvis"])},
+    )
+    before, after = (systematic().with_ground(clock_s).added_over_time(data, late=True) for clock_s in (0.0, 0.008))
+    for found, clock_s in ((before, LANDMARKS.clock), (after, 0.008)):
+        each = np.hypot(3.0, clock_s * np.stack([RATE, 0.5 * RATE]))
+        np.testing.assert_allclose(found["foot_wrench_sd"], np.broadcast_to(each, (4, 2, 6)))
+        np.testing.assert_allclose(found["wrench_sd"][:3], np.tile(np.hypot(4.0, clock_s * 1.5 * RATE), (3, 1)))
+        np.testing.assert_array_equal(found["wrench_sd"][3], np.full(6, 4.0))  # derived: no plate's clock is in it
+    assert (after["moments_sd"][:, 9] > before["moments_sd"][:, 9]).all()
+    beside = data.assign(foot_contact=(("time", "foot"), np.array([[1, UNMEASURED]] * 4, np.uint8)))
+    found = systematic().with_ground(0.008).added_over_time(beside, late=True)["foot_wrench_sd"]
+    np.testing.assert_array_equal(found[:, 0], after["foot_wrench_sd"][:, 0])
+    np.testing.assert_array_equal(found[:, 1], np.full((4, 6), 3.0))

@@ -172,6 +172,22 @@ def test_smoothed_moments_and_bands_are_those_with_the_feet(
     assert (np.abs(with_feet - without)[knees] > 0.005 * without[knees]).all()
 
 
+def test_the_total_wrench_is_what_the_feet_give(squat: tuple[Live, list[LiveFrame], list[str]]) -> None:
+    tracker, frames = squat[0].tracker, squat[1]
+    model, x, step = tracker.core_model, tracker.state, tracker._stepped[-1]
+    assert step.loads is not None and step.plates_sd is not None and tracker.systematic is not None
+    given = _core.contact_moments(model, x, step.loads)["foot_wrench"]
+    np.testing.assert_allclose(frames[-1].estimate.wrench, given[:-1].sum(axis=0))
+    assert np.abs(given[-1]).max() > 0.1  # what the movement needs beside it
+    rate = tracker._wrench_rate(step, x, given)
+    assert rate is not None
+    late = tracker.systematic.sizes.clock * rate[:-1].sum(axis=0)
+    sd = tracker.deviations()["wrench"].values
+    own = _core.contact_moments(model, x, step.loads, 0, np.asfortranarray(tracker.covariance))["foot_wrench_sd"]
+    np.testing.assert_allclose(sd, np.hypot(np.fmin(step.plates_sd, own[:-1].sum(axis=0)), late))
+    assert (sd[:3] < 6.0).all() and (np.abs(late) > 0.0).all()
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_walking_leaves_out_what_offline_leaves_out(seed: int) -> None:
     """Measured on seeds 1 to 6: live keeps the 5 or 6 frames before a foot lands beside the plates, where the force is

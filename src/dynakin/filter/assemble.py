@@ -27,9 +27,9 @@ from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import ON_PLATE, UNMEASURED
 from dynakin.recordings.low_passed import LowPass
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.measures.facing import nearly_singular
-from dynakin.results.measures.sources import MEASURED, plates_refused, refused_for_long
+from dynakin.results.measures.sources import MEASURED, plates_refused, refused_for_long, wrench_sources
 from dynakin.results.records import NO_ESTIMATE_CODES, Timing
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
@@ -102,6 +102,7 @@ def assemble(
     )
     if feet is not None:
         _widen_priors(data, prior_factor(used), feet.blind)
+        data = _with_total(data, feet)
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])
     names = ("initial_covariance", "final_covariance")
     data.update({name: (("element", "element_"), P) for name, P in zip(names, covariances, strict=True)})
@@ -175,6 +176,23 @@ def _widen_priors(data: xr.Dataset, factor: float, blind: npt.NDArray[np.bool_])
     resting = (data["moment_source"] != MEASURED) & unmeasured.any("foot")
     where = {"foot_wrench_sd": unmeasured, "moments_sd": resting, "wrench_sd": xr.DataArray(blind, dims="time")}
     data.update({name: data[name].where(~these, factor * data[name]) for name, these in where.items()})
+
+
+def _with_total(data: xr.Dataset, feet: ContactLoads) -> xr.Dataset:
+    """With the total wrench that the contacts give where plates measure all of them, and is as sure as these, and in
+    ``wrench_needed`` what the movement needs, which has all that the model does not explain in it."""
+    if RESIDUAL not in feet.names:
+        return data
+    measured = feet.by_plates[:, None] & (wrench_sources(data) == MEASURED)
+    needed, sd = values_of(data, "wrench_estimated"), values_of(data, "wrench_sd")
+    given = needed - values_of(data, "wrench_remainder")
+    given_sd = np.fmin(feet.plates_sd(), values_of(data, "foot_wrench_sd")[:, :-1].sum(axis=1))
+    found = {
+        "wrench_estimated": np.where(measured, given, needed),
+        "wrench_sd": np.where(measured, given_sd, sd),
+        "wrench_needed": needed,
+    }
+    return data.assign({name: (("time", "component"), values) for name, values in found.items()})
 
 
 def _without_infinities(data: xr.Dataset) -> list[Message]:

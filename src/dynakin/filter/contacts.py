@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ from dynakin.filter.samples import in_step
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.times import step_of
 from dynakin.results.estimate import values_of
+from dynakin.results.measures.sources import MEASURED, wrench_sources
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -142,6 +143,29 @@ class ContactLoads:
         measured = ((own == ON_PLATE) | (own == SHARED_PLATE)).any(axis=1)
         return np.asarray(self.known & ~measured & (own == UNMEASURED).any(axis=1))
 
+    @property
+    def by_plates(self) -> Flags:
+        """(T,) frames in which plates measure all that acts, and what the model does not explain stands apart from it:
+        the contacts' sum is the total wrench then, and not what the movement needs, which has that in it."""
+        if self.names[-1] != RESIDUAL:
+            return np.zeros(len(self.contact), dtype=bool)
+        measured = (self.contact[:, :-1] != UNMEASURED).all(axis=1) & (self.contact[:, -1] == ON_PLATE)
+        return np.asarray(measured & self.known)
+
+    def plates_sd(self) -> Array:
+        """(T, 6) of the contacts' sum as plates measure it, without the residual. The filter leaves no more of it: it
+        knows what is needed at least as well as the sum with the residual (docs/derivations.md, section 15)."""
+        names = [name for name in self.names if name != RESIDUAL]
+        own = slice(0, 6 * len(names))
+        plates = replace(
+            self,
+            names=tuple(names),
+            wrench=self.wrench[:, : len(names)],
+            covariance=self.covariance[:, own, own],
+            contact=self.contact[:, : len(names)],
+        )
+        return np.sqrt(np.diagonal(plates.total()[1], axis1=1, axis2=2))
+
     def weighed(self, variance_scale: float) -> ContactLoads:
         """With the errors of frames in which feet bear and no plate measures anything on the scale of all other noise
         (`Noise.variance_scale`): what is left there, priors and what the model does not explain, is weighed against the
@@ -201,6 +225,29 @@ def wrenches_of(data: xr.Dataset) -> tuple[Array, list[str]]:
     if "foot_wrench" not in data:
         return np.zeros((len(data["time"]), 0, 6)), []
     return np.nan_to_num(values_of(data, "foot_wrench")), [str(name) for name in data["foot_segment"].values]
+
+
+def rates(wrench: Array, time: Array) -> Array:
+    """By how much wrenches (T, ...) change, a second, from sample to sample (a load passes from foot to foot within
+    one); 0 beside what is not known."""
+    return np.nan_to_num(np.gradient(wrench, time, axis=0)) if len(time) > 1 else np.zeros_like(wrench)
+
+
+def late_by(data: xr.Dataset, clock_sd_s: float) -> dict[str, Any]:
+    """Deviations of the contacts' wrenches, and of their sum where that is measured, with a clock of the plates that is
+    off by so much: what acts later is off by that times its change, as in moments. No plate's clock is in what none
+    measures."""
+    time = np.asarray(data["time"].values)
+    found: dict[str, Any] = {}
+    if "foot_wrench_sd" in data:
+        unmeasured = (values_of(data, "foot_contact") == UNMEASURED)[..., None]
+        late = clock_sd_s * rates(np.where(unmeasured, np.nan, values_of(data, "foot_wrench")), time)
+        found["foot_wrench_sd"] = (("time", "foot", "component"), np.hypot(values_of(data, "foot_wrench_sd"), late))
+    if "wrench_sd" in data:
+        late = clock_sd_s * rates(values_of(data, "wrench_estimated"), time)
+        late = np.where(wrench_sources(data) == MEASURED, late, 0.0)
+        found["wrench_sd"] = (("time", "component"), np.hypot(values_of(data, "wrench_sd"), late))
+    return found
 
 
 def any_off_plates(data: xr.Dataset, feet: int) -> bool:

@@ -1,4 +1,5 @@
-"""From a measured model and noise settings to the core's filter, ready for its first frame."""
+"""From a measured model and noise settings to the core's filter, ready for its first frame, and its arrays once it has
+looked back."""
 
 from __future__ import annotations
 
@@ -79,3 +80,27 @@ def filter_settings(
         iterate_beyond=limit_sd(noise, noise.iterate_beyond_sd),
         recovery=recovery,
     )
+
+
+# Arrays of the forward run -> those of the way back that take their places. Predictions and innovations stay.
+_PLACES = {
+    "state": "smoothed_state",
+    "state_sd": "smoothed_state_sd",
+    "markers_estimated": "smoothed_markers",
+    "markers_sd": "smoothed_markers_sd",
+    "wrench_estimated": "smoothed_wrench",
+    "wrench_sd": "smoothed_wrench_sd",
+    "moments": "smoothed_moments",
+    "moments_sd": "smoothed_moments_sd",
+    "foot_wrench": "smoothed_foot_wrench",
+    "foot_wrench_sd": "smoothed_foot_wrench_sd",
+    "foot_adjustment": "smoothed_foot_adjustment",
+    "remainder": "smoothed_remainder",
+    "moment_source": "smoothed_moment_source",
+}
+
+
+def smoothed(arrays: dict[str, Array]) -> dict[str, Array]:
+    """`_core.Filter.run_smoothed`'s arrays with the smoothed ones in the places of the filtered."""
+    kept = {name: values for name, values in arrays.items() if not name.startswith("smoothed_")}
+    return kept | {name: arrays[source] for name, source in _PLACES.items() if source in arrays}

@@ -157,33 +157,42 @@ def step_estimate(
     report: _core.StepReport | None,
     sources: Codes,
     feet: _core.ContactLoads | None = None,
+    *,
+    by_plates: bool = False,
 ) -> StepEstimate:
     """Everything that a state x (n,) says of its frame; with one frame of feet the moments that these leave.
 
     Args:
-        sources: (C,) codes of the moments; what is absent becomes NaN.
+        sources: (C,) codes of the moments; what is absent becomes NaN. by_plates: whether plates measure all of the
+            feet, of which the last is the residual: their sum is the total wrench then.
     """
     q, qd, qdd = _core.coordinates(model, x)
-    moments = _core.joint_moments(model, x) if feet is None else _core.contact_moments(model, x, feet)["moments"]
+    found = {} if feet is None else _core.contact_moments(model, x, feet)
+    moments = found["moments"] if found else _core.joint_moments(model, x)
     values = {
         "coordinates": q,
         "speeds": qd,
         "accelerations": qdd,
         "moments": np.where(sources == ABSENT, np.nan, moments),
         "moment_sources": sources,
-        "wrench": _core.wrench(model, x),
+        "wrench": found["foot_wrench"][:-1].sum(axis=0) if by_plates else _core.wrench(model, x),
         "markers": _core.marker_positions(model, x),
     }
     return StepEstimate(time_s, values, labels, report)
 
 
 def deviations_of(
-    model: _core.Model, x: Array, covariance: Array, feet: _core.ContactLoads | None = None
+    model: _core.Model,
+    x: Array,
+    covariance: Array,
+    feet: _core.ContactLoads | None = None,
+    plates_sd: Array | None = None,
 ) -> dict[str, Array]:
     """Standard deviations of a state's outputs: J P J' for moments and wrench.
 
     Args:
         x: (n,). covariance: (n, n). feet: one frame, whose wrenches the moments come from; NaN where these are unknown.
+            plates_sd: (6,) of their sum where plates measure all of it (`ContactLoads.plates_sd`).
 
     Returns:
         coordinates, speeds, accelerations, moments (C,), 0 where a coordinate is locked (not its moment); wrench (6,).
@@ -195,11 +204,14 @@ def deviations_of(
         offset, size = model.layout.blocks[name]
         found[name] = np.zeros(len(model.coordinate_names))
         found[name][free] = np.sqrt(variance[offset : offset + size])
+    found["wrench"] = _propagated(_core.wrench_jacobian(model, x), covariance)
     if feet is None:
         found["moments"] = _propagated(_core.moment_jacobian(model, x), covariance)
     else:
-        found["moments"] = _core.contact_moments(model, x, feet, 0, covariance)["moments_sd"]
-    found["wrench"] = _propagated(_core.wrench_jacobian(model, x), covariance)
+        by_feet = _core.contact_moments(model, x, feet, 0, covariance)
+        found["moments"] = by_feet["moments_sd"]
+        if plates_sd is not None:
+            found["wrench"] = np.fmin(plates_sd, by_feet["foot_wrench_sd"][:-1].sum(axis=0))
     return found
 
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
-from dynakin.filter.contacts import any_off_plates, wrenches_of
+from dynakin.filter.contacts import any_off_plates, late_by, rates, wrenches_of
 from dynakin.filter.error_sizes import KINDS, OF_JOINTS, Sizes, less_sure_joints, usual_sizes
 from dynakin.filter.in_hands import Hands
 from dynakin.filter.joint_errors import JointErrors, drives, floats, neutral, rolls
@@ -248,8 +248,7 @@ class Systematic:
             kind: {block: _between(time, time[chosen], np.array([p[kind][block] for p in each])) for block in BLOCKS}
             for kind in (*KINDS, "inertia")
         }
-        # a load passes from foot to foot within a sample
-        rate = np.gradient(wrench, time, axis=0) if len(time) > 1 else np.zeros_like(wrench)
+        rate = rates(wrench, time)
         for k in np.flatnonzero(np.isfinite(states).all(axis=1)):
             found["clock"]["moments"][k] = self._by_clock(states[k], rate[k], segments)
         return found
@@ -332,7 +331,8 @@ class Systematic:
         )  # fmt: skip
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
-        """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
+        """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``, and the plates' clock in
+        those of contacts' wrenches."""
         own = {block: values_of(data, f"{block}_sd") for block in BLOCKS}
         moved = self.moved_m(values_of(data, "state"))
         sources = moment_sources(data)
@@ -341,7 +341,8 @@ class Systematic:
         off_plates = any_off_plates(data, self._feet)
         step_s = step_of(data["time"].values)
         sd = reported(self.sizes, self._variance_scale, own, *found, off_plates=off_plates, late=late, step_s=step_s)
-        return data.assign({f"{block}_sd": (("time", "coordinate"), sd[block]) for block in BLOCKS})
+        blocks = {f"{block}_sd": (("time", "coordinate"), sd[block]) for block in BLOCKS}
+        return data.assign(blocks | late_by(data, self.sizes.clock))
 
     def moved_m(self, x: Array) -> Array:
         """(...,) how far markers are found from where the model has them by states (..., n), mean; 0 where none is

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.contacts import ContactLoads, stands_off_plates
-from dynakin.filter.core_filter import core_filter
+from dynakin.filter.core_filter import core_filter, smoothed
 from dynakin.filter.noise import prior_factor
 from dynakin.filter.reported_sd import BLOCKS, as_believed
 from dynakin.filter.samples import Sample, sample_arrays
@@ -34,8 +34,9 @@ Array = npt.NDArray[np.float64]
 
 
 class _Stepped(NamedTuple):
-    """Of a step: its feet, whose moments are measured, their segments, whether plates miss one of them, or all; (C,)
-    coordinates of which nothing is seen; (M,) markers that show the posture."""
+    """Of a step: its feet, whose moments are measured, their segments, whether plates miss one of them, or all; (6,)
+    deviations of their sum where plates measure all of it, else None; (C,) coordinates of which nothing is seen; (M,)
+    markers that show the posture."""
 
     time_s: float
     loads: _core.ContactLoads | None
@@ -43,6 +44,7 @@ class _Stepped(NamedTuple):
     segments: tuple[str, ...]
     unmeasured: bool
     blind: bool
+    plates_sd: Array | None
     unseen: npt.NDArray[np.bool_]
     used: npt.NDArray[np.bool_]
 
@@ -176,7 +178,8 @@ class Tracker:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
         unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
-        sources = self._sources.moments(feet, refused=self.verdicts[-1] == "refused" and not unmeasured)[0]
+        refused = self.verdicts[-1] == "refused"
+        sources = self._sources.moments(feet, refused=refused and not unmeasured)[0]
         if not self.calibrated.feet and self.verdicts[-1] != "accepted":
             sources = np.maximum(sources, np.uint8(DERIVED))
         if report.tracking in NO_ESTIMATE:
@@ -184,12 +187,20 @@ class Tracker:
         unseen = self._sources.unseen(self._sight.look(sample.time_s, markers), 1)[0]
         sources[unseen] = ABSENT
         blind = feet is not None and bool(feet.blind.any())
+        plates_sd = None if feet is None or refused or not feet.by_plates[0] else feet.plates_sd()[0]
         self._off_plates |= feet is not None and stands_off_plates(feet.contact, len(self.calibrated.feet))
         segments = () if feet is None else feet.segments
         used = self._sight.used
-        self._stepped.append(_Stepped(sample.time_s, loads, sources, segments, unmeasured, blind, unseen, used))
-        self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, sources, loads)
+        step = _Stepped(sample.time_s, loads, sources, segments, unmeasured, blind, plates_sd, unseen, used)
+        self._stepped.append(step)
+        self._latest = self._estimate(step, sample.time_s, self.state, report)
         return self._latest
+
+    def _estimate(self, step: _Stepped, time_s: float, x: Array, report: _core.StepReport | None) -> StepEstimate:
+        by_plates = step.plates_sd is not None
+        return step_estimate(
+            self.core_model, self._labels, time_s, x, report, step.sources, step.loads, by_plates=by_plates
+        )
 
     def delayed(self) -> StepEstimate | None:
         """The frame that lies ``lag`` frames back, smoothed by all samples until now; None before there is one.
@@ -205,7 +216,7 @@ class Tracker:
             return None
         step = self._delayed_step(lag)
         time = self._time - lag.delay_s
-        return step_estimate(self.core_model, self._labels, time, lag.state, None, step.sources, step.loads)
+        return self._estimate(step, time, lag.state, None)
 
     def deviations(self, *, delayed: bool = False) -> dict[str, Labelled]:
         """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step. They
@@ -228,7 +239,7 @@ class Tracker:
             lag = self._with_lag()
             step, state, covariance = self._delayed_step(lag), lag.state, lag.covariance
         loads = step and step.loads
-        found = deviations_of(self.core_model, state, covariance, loads)
+        found = deviations_of(self.core_model, state, covariance, loads, step and step.plates_sd)
         if step is not None and step.unmeasured:
             found["moments"] = np.where(step.sources != MEASURED, prior_factor(self.noise), 1.0) * found["moments"]
             found["wrench"] = (prior_factor(self.noise) if step.blind else 1.0) * found["wrench"]
@@ -237,6 +248,8 @@ class Tracker:
             if step is not None and step.loads is not None:
                 wrench = _core.contact_moments(self.core_model, state, step.loads)["foot_wrench"]
                 rate = self._wrench_rate(step, state, wrench)
+                if step.plates_sd is not None and rate is not None:
+                    found["wrench"] = np.hypot(found["wrench"], self.systematic.sizes.clock * rate[:-1].sum(axis=0))
             segments = () if step is None else step.segments
             sources, used = (None, None) if step is None else (step.sources, step.used)
             if step is not None and not step.unmeasured:  # what is derived has refused plates
@@ -365,27 +378,3 @@ class Tracker:
             return None
         feet.check(self.core_model)
         return feet.core()
-
-
-# Arrays of the forward run -> those of the way back that take their places. Predictions and innovations stay.
-_PLACES = {
-    "state": "smoothed_state",
-    "state_sd": "smoothed_state_sd",
-    "markers_estimated": "smoothed_markers",
-    "markers_sd": "smoothed_markers_sd",
-    "wrench_estimated": "smoothed_wrench",
-    "wrench_sd": "smoothed_wrench_sd",
-    "moments": "smoothed_moments",
-    "moments_sd": "smoothed_moments_sd",
-    "foot_wrench": "smoothed_foot_wrench",
-    "foot_wrench_sd": "smoothed_foot_wrench_sd",
-    "foot_adjustment": "smoothed_foot_adjustment",
-    "remainder": "smoothed_remainder",
-    "moment_source": "smoothed_moment_source",
-}
-
-
-def smoothed(arrays: dict[str, Array]) -> dict[str, Array]:
-    """`_core.Filter.run_smoothed`'s arrays with the smoothed ones in the places of the filtered."""
-    kept = {name: values for name, values in arrays.items() if not name.startswith("smoothed_")}
-    return kept | {name: arrays[source] for name, source in _PLACES.items() if source in arrays}

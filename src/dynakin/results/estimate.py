@@ -51,6 +51,7 @@ class Estimate:
     moments                                                       (time, coordinate)          N m or N
     markers_measured, markers_estimated, markers_predicted        (time, marker, axis)        m
     wrench_measured, wrench_estimated, wrench_predicted           (time, component)           N or N m
+    wrench_sd, wrench_needed                                      (time, component)           N or N m
     markers_innovation, markers_innovation_sd                     (time, marker, axis)        m
     wrench_innovation, wrench_innovation_sd                       (time, component)           N or N m
     test_ratio, verdict                                           (time, sensor)              1, codes
@@ -74,8 +75,10 @@ class Estimate:
     missing, 1 accepted, 2 refused, by the gate or because recovery found that it fits nothing. The coordinate variable
     ``coordinate_type`` says "rotation" or "translation" for each coordinate, ``marker_axes_modelled`` says for each
     axis whether the model explains it. The wrench is what the ground does to the person, about the model's ground
-    origin. ``joint_loads`` is what a segment's parent does to it through the joint by which it hangs, muscles and all,
-    ground axes, about the joint's centre; ``joint_orientations`` turns a segment's axes into the ground's. The feet's
+    origin. ``wrench_estimated`` is the sum of ``foot_wrench`` where plates measure all contacts, else what the movement
+    needs by the model, which ``wrench_needed`` is throughout, with all that the model does not explain in it.
+    ``joint_loads`` is what a segment's parent does to it through the joint by which it hangs, muscles and all, ground
+    axes, about the joint's centre; ``joint_orientations`` turns a segment's axes into the ground's. The feet's
     variables are there if the moments were made with the feet's wrenches: ``foot_contact`` is 0 in the air, 1 on a
     plate, 2 not measured, 3 on a plate that bears another contact too. ``moment_source``, ``joint_source`` and
     ``foot_source`` are 0 where a moment, a joint's load or a foot's wrench is measured (with all the ground's reactions
@@ -84,7 +87,8 @@ class Estimate:
     (`dynakin.results.measures.sources`).
 
     Deviations (``*_sd``) of coordinates, speeds, accelerations and moments hold what the filter cannot know of joints,
-    skin and centres of mass (`filter.systematic`); an angle's zero is not in them. ``state_sd`` and covariances are the
+    skin and centres of mass (`filter.systematic`), moments, ``foot_wrench`` and a measured total wrench also how far
+    plates may be out of step; an angle's zero is not in them. ``state_sd`` and covariances are the
     filter's own, but for ``state_sd`` of constants, which is by the declared noise.
 
     ``lost`` (time,) is true in frames in which the filter lost the person: everything that was estimated there is NaN,

@@ -27,7 +27,7 @@ from dynakin.results.measures.facing import facing
 from dynakin.results.measures.mean_curves import MEASURED, MeanCurve, mean_curves, signals
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import Found, repetitions_of
-from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
+from dynakin.results.measures.sources import measured_only, moment_sources, needed_wrench, wrench_sources
 from dynakin.results.measures.tracking import why_lost
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.lag import in_words
@@ -282,7 +282,7 @@ def _method(name: str, kind: str, data: xr.Dataset) -> Method:
         values_of(data, "coordinates"),
         values_of(data, "moments"),
         values_of(data, "markers_estimated"),
-        values_of(data, "wrench_estimated"),
+        needed_wrench(data),
         data,
     )
 

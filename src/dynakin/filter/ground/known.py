@@ -31,9 +31,11 @@ marked whole shows is drawn towards none, and farther off than the fine search r
 CLOCK_UNKNOWN = (
     "Whether plates and markers are in step within some milliseconds is not known here: it takes half a second of a "
     "movement in which the plates carry all of the person, never more than twice the weight, and no declared contact. "
-    "Deviations of moments hold a few."
+    "Deviations of moments and of the feet's forces hold a few."
 )
-CLOCK_OF_LEGS = ", which may be none: not all of the body is marked. Deviations of moments hold it."
+CLOCK_OF_LEGS = (
+    ", which may be none: not all of the body is marked. Deviations of moments and of the feet's forces hold it."
+)
 
 
 def known_ground(

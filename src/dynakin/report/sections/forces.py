@@ -17,7 +17,7 @@ from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.pressure import centre_of_pressure, support_height
-from dynakin.results.measures.sources import measured_only, wrench_sources
+from dynakin.results.measures.sources import measured_only, needed_wrench, wrench_sources
 from dynakin.results.measures.stances import compared_stances
 from dynakin.results.naming import number, sentence
 from dynakin.units import COMPONENTS
@@ -29,7 +29,7 @@ def wrench_section(page: Page) -> Section | None:
     """The total of all plates, measured and estimated."""
     if page.metrics["wrench"] is None:
         return None
-    measured, estimated = (page.estimate.values(f"wrench_{kind}") for kind in ("measured", "estimated"))
+    measured, estimated = page.estimate.values("wrench_measured"), needed_wrench(page.estimate.data)
     source = wrench_sources(page.estimate.data)
     # a planar model's wrench is its own, plates or not; of a body in space only what is measured is compared
     shown = np.isfinite(estimated if page.planar else measured).any(axis=0)
@@ -54,8 +54,9 @@ _IN_A_PLANE = (
     "What the ground does to the person, in forces and the moment about the toe, where the model stands on the ground."
 )
 _IN_SPACE = (
-    "What the ground does to the person in all, in forces and the moment about the ground’s origin. Where a foot "
-    "stands off the plates the total is not measured."
+    "What the ground does to the person in all, as the plates measure it and as the movement needs it by the model, in "
+    "forces and the moment about the ground’s origin: how well the two agree. Where a foot stands off the plates the "
+    "total is not measured."
 )
 
 

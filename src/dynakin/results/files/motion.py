@@ -160,8 +160,8 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
         np.hstack(columns) if columns else np.empty((len(estimate.time), 0)),
         in_degrees=True,
         notes=[
-            "One standard deviation: the filter's, with what is not known of joints and of skin that follows them; the "
-            "zero of an angle is not in it. Degrees, metres, seconds, N, N m.",
+            "One standard deviation: the filter's, with what is not known of joints, of skin that follows them and of "
+            "the plates' clock; the zero of an angle is not in it. Degrees, metres, seconds, N, N m.",
             "Of moments and feet's forces that are derived or a prior too (moments_source.sto, feet_source.sto); nan "
             "where absent.",
         ],
@@ -172,12 +172,14 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
 def write_wrench(estimate: Estimate, path: Path) -> None:
     """``wrench.sto``: N and N m, ground frame, about the model's ground origin, what the ground does to the person.
 
-    Columns ``fx_measured`` ... ``mz_measured``, ``fx_estimated`` ... ``mz_estimated``; a component that is never
-    measured, or that the model does not explain, has no column.
+    Columns ``fx_measured`` ... ``mz_measured``, ``fx_estimated`` ... ``mz_estimated`` and, where contacts give the
+    total, ``fx_needed`` ... ``mz_needed``; a component that is never measured, or that the model does not explain, has
+    no column.
     """
     names: list[str] = []
     columns: list[np.ndarray] = []
-    for kind in ("measured", "estimated"):
+    kinds = [kind for kind in ("measured", "estimated", "needed") if f"wrench_{kind}" in estimate.data]
+    for kind in kinds:
         values = estimate.values(f"wrench_{kind}")
         for index, component in enumerate(COMPONENTS):
             if np.isfinite(values[:, index]).any():
@@ -194,6 +196,11 @@ def write_wrench(estimate: Estimate, path: Path) -> None:
         notes=[
             "Forces in N, moments in N m about the origin of the frame, acting from the ground on the person. "
             "Estimated where it is not measured, derived from the motion.",
+            *(
+                ["Estimated where it is measured: the sum of feet.sto. Needed: by the movement and the model alone."]
+                if "needed" in kinds
+                else []
+            ),
             _frame(estimate),
         ],
         digits=DIGITS,

@@ -11,6 +11,7 @@ import numpy as np
 from dynakin.arrays import rms, rms_length
 from dynakin.recordings.times import step_of
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.sources import needed_wrench
 from dynakin.results.records import Parameter
 from dynakin.units import COMPONENTS
 
@@ -151,8 +152,8 @@ def _misfits(estimate: Estimate) -> dict[str, np.ndarray]:
         "time", "marker", "axis"
     )
     distance = rms_length(markers.values[:, :, axes], axis=1)
-    wrench = (estimate.data["wrench_measured"] - estimate.data["wrench_estimated"]).transpose("time", "component")
-    found = {"markers": distance} | {name: wrench.values[:, k] for k, name in enumerate(COMPONENTS)}
+    wrench = estimate.values("wrench_measured") - needed_wrench(estimate.data)
+    found = {"markers": distance} | {name: wrench[:, k] for k, name in enumerate(COMPONENTS)}
     return {name: path for name, path in found.items() if np.isfinite(path).any()}
 
 

@@ -29,7 +29,7 @@ from dynakin.results.measures.fit import SignalFit, marker_rms_mm, signal_fit
 from dynakin.results.measures.posterior import posterior_figures
 from dynakin.results.measures.power import work
 from dynakin.results.measures.soft_tissue import soft_tissue
-from dynakin.results.measures.sources import moment_figures
+from dynakin.results.measures.sources import moment_figures, needed_wrench
 from dynakin.results.measures.stances import counted
 from dynakin.results.measures.symmetry import asymmetry
 from dynakin.results.measures.tracking import lost_in_words, tracking_figures, why_lost
@@ -149,7 +149,7 @@ def _markers(estimate: Estimate, kind: str, window: np.ndarray) -> dict[str, Any
 
 def _wrench(estimate: Estimate, kind: str, window: np.ndarray) -> dict[str, dict[str, float | None]]:
     measured = _array(estimate, "wrench_measured")[window]
-    compared = _array(estimate, f"wrench_{kind}")[window]
+    compared = (needed_wrench(estimate.data) if kind == "estimated" else _array(estimate, f"wrench_{kind}"))[window]
     fits = {name: signal_fit(measured[:, k], compared[:, k]) for k, name in enumerate(COMPONENTS)}
     fits = {name: fit for name, fit in fits.items() if fit.rms is not None}
     renamed = {"nrms_rms_percent": "nrms_percent"}  # its name in the file from before there were two

@@ -170,6 +170,12 @@ def wrench_sources(data: xr.Dataset) -> Codes:
     return codes
 
 
+def needed_wrench(data: xr.Dataset) -> Array:
+    """(T, 6) N and N m: the total wrench that the movement needs, by the model. How far the plates are from it shows
+    how well the two agree, which ``wrench_estimated``, made of the plates where they measure all, cannot."""
+    return values_of(data, "wrench_needed" if "wrench_needed" in data else "wrench_estimated")
+
+
 def measured_only(values: Array, sources: Codes) -> Array:
     """Values, NaN where they are not measured: what peaks, work, symmetry and mean curves are made of."""
     return np.where(sources == MEASURED, values, np.nan)
