@@ -14,12 +14,14 @@ import pytest
 
 import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
+from dynakin.bindings import _core
 from dynakin.cli.prepared import assumed
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.closure import closure
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.impossible import impossible
-from dynakin.filter.sources import LiveSight, with_sources
+from dynakin.filter.sight import LiveSight
+from dynakin.filter.sources import with_sources
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import MEASURED as FOOT_MEASURED
@@ -33,7 +35,7 @@ from dynakin.recordings.recording import Plate, Recording
 from dynakin.report.insights import insights
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import compute_metrics
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, out_of_sight, wrench_sources
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, out_of_sight, taken_back, wrench_sources
 from dynakin.settings.settings import Settings
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
@@ -498,7 +500,6 @@ def test_what_nobody_sees_for_longer_than_a_gap_is_absent() -> None:
     seen = np.ones((len(time), len(owners)), dtype=bool)
     long, short = (time > 1.0) & (time < 1.5), (time > 2.0) & (time < 2.1)
     seen[long | short, 1:4] = False
-    seen[long, 4] = False  # the left foot is seen
     hidden = out_of_sight(seen, owners, time)
     np.testing.assert_array_equal(hidden["shank_r"], long)
     feet: Any = SimpleNamespace(contact=np.zeros_like(data["foot_contact"].values), segments=("foot_r", "foot_l"))
@@ -555,15 +556,53 @@ def test_a_pelvis_whose_markers_vanish_is_as_unsure_as_it_errs_or_absent(left: i
 
 def test_live_a_pelvis_counts_as_unseen_while_fewer_than_two_of_its_markers_are_seen() -> None:
     walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
-    spec = person("fullbody").calibrate(walk).spec
-    sight, markers = LiveSight(spec), np.zeros((len(spec.markers), 3))
+    calibrated = person("fullbody").calibrate(walk)
+    spec, state = calibrated.spec, calibrated.x0
+    sight, markers = LiveSight(_core.Model(spec)), np.zeros((len(spec.markers), 3))
     own = [k for k, marker in enumerate(spec.markers) if marker.segment == "pelvis"]
-    assert sight.look(0.0, markers) == {}
+    assert sight.look(0.0, markers, state) == {}
     markers[own[2:]] = np.nan
-    assert sight.look(1.0, markers) == {}
+    assert sight.look(1.0, markers, state) == {}
     markers[own[1:]] = np.nan
-    assert sight.look(1.1, markers) == {}  # the second was seen at 1.0 s
-    assert [name for name, gone in sight.look(1.4, markers).items() if gone] == ["pelvis"]
+    assert sight.look(1.1, markers, state) == {}  # the second was seen at 1.0 s
+    assert [name for name, gone in sight.look(1.4, markers, state).items() if gone] == ["pelvis"]
+
+
+def test_a_thigh_is_shown_by_its_shank_an_upper_arm_not_by_two_markers_at_the_wrist() -> None:
+    """An arm may turn about the line from shoulder to wrist: it was up to 115 deg off, said 5, and its own markers,
+    once back, were refused."""
+    trial = simulate("fullbody", "gait", 3, 4.0, 50.0)
+    names, gap = list(trial.recording.marker_names), slice(90, 115)
+    of = ("R_elbow", "R_humerus", "r_knee", "r_mknee", "r_thigh")
+    lost = [k for k, name in enumerate(names) if name.startswith(of)]
+    markers = trial.recording.markers.copy()
+    markers[gap, lost] = np.nan
+    estimator = person("fullbody")
+    found = estimator.run(replace(trial.recording, markers=markers))
+    arm, leg = ["arm_flex_r", "arm_add_r", "arm_rot_r", "elbow_flex_r", "pro_sup_r"], ["hip_rotation_r", "knee_angle_r"]
+    unknown = np.isnan(found.data["coordinates_sd"].sel(coordinate=arm).values)
+    assert unknown[gap].all() and not unknown[:90].any() and not unknown[118:].any()
+    assert np.isnan(found.data["moments"].sel(coordinate=arm).values[gap]).all()
+    assert np.isnan(found.data["markers_sd"].sel(marker=["R_elbow_lat", "R_elbow_med"]).values[gap]).all()
+    assert np.isfinite(found.data["coordinates_sd"].sel(coordinate=leg).values).all()
+    assert np.isfinite(found.data["markers_sd"].sel(marker="R_wrist_ulna").values).all()
+    assert not [event for event in found.events if event.kind in ("gated", "reset")]
+    model = estimator.calibrate(trial.recording)
+    sight = LiveSight(_core.Model(model.spec))
+    full, without = np.zeros((len(model.spec.markers), 3)), np.zeros((len(model.spec.markers), 3))
+    owned = [k for k, marker in enumerate(model.spec.markers) if marker.segment in ("thigh_r", "upper_arm_r")]
+    without[owned] = np.nan
+    sight.look(0.0, full, model.x0)
+    assert [name for name, gone in sight.look(1.0, without, model.x0).items() if gone] == []
+    assert [name for name, gone in sight.look(1.3, without, model.x0).items() if gone] == ["upper_arm_r"]
+
+
+def test_what_comes_into_sight_again_and_is_refused_stays_unknown_and_is_not_accused() -> None:
+    seen, refused = np.ones((20, 2), dtype=bool), np.zeros((20, 2), dtype=bool)
+    seen[3:8, 0], refused[8:12, 0], refused[5:9, 1] = False, True, True
+    expected = seen.copy()
+    expected[8:12, 0] = False
+    np.testing.assert_array_equal(taken_back(seen, refused), expected)
 
 
 def test_a_segment_that_never_has_a_marker_in_sight_is_no_gap() -> None:

@@ -81,6 +81,37 @@ def test_a_step_beside_the_plates_leaves_the_total_out_while_it_may_bear_load() 
     assert any("right foot stands off the plates from 1.5" in text for text in map(str, loads.messages))
 
 
+@pytest.mark.parametrize("down", [200, 392])
+def test_a_heel_that_slides_when_it_touches_may_bear_from_then_on(down: int) -> None:
+    """At 1.2 m/s, slow 0.1 s later, or not any more before the recording ends: it was in the air, "measured" as 0."""
+    off = down - 100
+    loaded, swings = np.arange(T) >= down, (np.arange(T) >= off) & (np.arange(T) < down)
+    right, left = np.where(np.arange(T) < off, 300.0, 0.0), np.where(swings, 600.0, np.where(loaded, 100.0, 300.0))
+    recording = walker({"R": (off, down)}, (plate("a", left, at(0.0, -0.1)), plate("b", right, at(0.0, 0.1))), 0.8)
+    since = np.clip((np.arange(T) - down) / 100.0, 0.0, 0.17)
+    slid, markers = 1.2 * since - 0.5 * 1.2 / 0.17 * since**2, recording.markers.copy()
+    markers[down - 30 : down, 0:2, 0] = np.linspace(markers[down - 30, 0:2, 0], markers[down, 0:2, 0], 30)
+    markers[:, 0:2, 0] += slid[:, None]
+    markers[:, 1, 1] = np.where(loaded, 0.03 + 0.08 * (1.0 - since / 0.17), markers[:, 1, 1] + 0.08 * swings)
+    loads = foot_loads(replace(recording, markers=markers), LABORATORY, MARKERS)
+    assert (loads.reason[down:, 0] == OFF_PLATE).all() and (loads.reason[off + 20 : down - 15, 0] == SWING).all()
+    assert not loads.total_known[down:].any()
+
+
+def test_a_foot_held_near_the_floor_at_the_end_bears_nothing_while_the_plates_carry_all() -> None:
+    left = np.where(np.arange(T) < 100, 300.0, 600.0)
+    plates = (plate("a", left, at(0.0, -0.1)), plate("b", 600.0 - left, at(0.0, 0.1)))
+    recording = walker({"R": (100, 800)}, plates)
+    markers, after = recording.markers.copy(), np.maximum(np.arange(T) - 380, 0) / 100.0
+    markers[381:, 0:2, 1] = 0.045
+    markers[:, 0:2, 0] += after[:, None]
+    trunk = np.broadcast_to([0.0, 1.2, 0.0], (T, 5, 3))
+    names = (*recording.marker_names, *(f"T{k}" for k in range(5)))
+    recording = replace(recording, marker_names=names, markers=np.concatenate([markers, trunk], axis=1))
+    loads = foot_loads(recording, LABORATORY, MARKERS)
+    assert (loads.reason[250:, 0] == SWING).all() and loads.total_known[250:].all()
+
+
 def test_a_heel_beyond_the_edge_of_its_plate_is_off_it() -> None:
     both = np.full(T, 300.0)
     shifted = CORNERS + np.array([0.25, 0.0, 0.0])  # from x = -0.05: the heel markers at -0.1 lie 50 mm beyond

@@ -46,7 +46,7 @@ def a_step(down: int, off: int, first: int, end: int, belt_m_s: float = 0.0) -> 
     return FootContact(
         outline, np.stack([heel, up], axis=1), ~blank, np.zeros((FRAMES, 0), bool), np.zeros(FRAMES),
         np.tile([belt_m_s, 0.0], (FRAMES, 1)), np.tile(stands[:, None], (1, 2)), stands, ((first, end),), blank, blank,
-        blank,
+        blank, blank,
     )  # fmt: skip
 
 

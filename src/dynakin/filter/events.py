@@ -8,13 +8,22 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import runs
+from dynakin.bindings import _core
+from dynakin.filter.sight import owners_of, root_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_names
 from dynakin.recordings.times import span
+from dynakin.results.measures.sources import out_of_sight, taken_back
 from dynakin.results.records import REFUSED, TRACKING, Event, EventKind, Parameter
 
 if TYPE_CHECKING:
     import xarray as xr
+
+Flags = npt.NDArray[np.bool_]
+
+FOUND_S = 0.05
+"""While a segment that comes into sight again is found, markers beside it may be refused: of an arm in a squat both at
+the wrist for 0.02 s."""
 
 
 def events_of(
@@ -22,11 +31,12 @@ def events_of(
 ) -> list[Event]:
     """Events in the order of their times; one a stretch, not one a frame."""
     time = data["time"].values
+    back, sought = _coming_back(data, initial.spec)
     events = [
         *_missing(data),
         *(_total_unknown(data) if initial.feet else ()),
-        *_refused(data),
-        *_tracking(data),
+        *_refused(data, back),
+        *_tracking(data, sought),
         *_held(data, unseen_sd),
         *_coordinates_at_bounds(data, initial),
     ]
@@ -55,9 +65,24 @@ def _total_unknown(data: xr.Dataset) -> list[Event]:
     return _stretches(data["time"].values, lost, "missing", "plates", "total wrench not known, left out")
 
 
-def _refused(data: xr.Dataset) -> list[Event]:
-    """Markers and plates that the gate did not believe."""
-    verdicts = data["verdict"].values
+def _coming_back(data: xr.Dataset, spec: _core.ModelSpec) -> tuple[Flags, Flags]:
+    """(T, M) markers that are refused because nobody knows where a segment is that comes into sight again; (T,) frames
+    in which it is found, up to `FOUND_S` after the first of its markers is taken. Neither speaks against them."""
+    time = data["time"].values
+    seen = np.isfinite(data["markers_measured"].values).any(axis=2)
+    taken, owners = taken_back(seen, data["verdict"].values[:, :-1] == REFUSED), owners_of(spec)
+    hidden = out_of_sight(taken, owners, time, root_of(spec))
+    sought = np.zeros(len(time), dtype=bool)
+    for own in hidden.values():
+        for _, end in runs(own):
+            sought |= (time >= time[end - 1]) & (time <= time[end - 1] + FOUND_S)
+    return sought[:, None] | (np.stack([hidden[owner] for owner in owners], axis=1) & seen & ~taken), sought
+
+
+def _refused(data: xr.Dataset, back: Flags) -> list[Event]:
+    """Markers and plates that the gate did not believe, but for those that come back (T, M)."""
+    verdicts = data["verdict"].values.copy()
+    verdicts[:, :-1][back] = 0
     names = [str(name) for name in data["sensor"].values]
     return [
         event
@@ -72,9 +97,11 @@ def _refused(data: xr.Dataset) -> list[Event]:
     ]
 
 
-def _tracking(data: xr.Dataset) -> list[Event]:
-    """Stretches in which the filter did not believe its markers, and what it did about them."""
-    time, tracking = data["time"].values, data["tracking"].values
+def _tracking(data: xr.Dataset, sought: Flags) -> list[Event]:
+    """Stretches in which the filter did not believe its markers, and what it did about them, but for what is found when
+    it comes into sight again (T,)."""
+    time, tracking = data["time"].values, data["tracking"].values.copy()
+    tracking[sought & (tracking == TRACKING.index("found"))] = TRACKING.index("following")
     kinds: tuple[tuple[str, EventKind, str], ...] = (
         ("doubtful", "gated", "most markers contradict the motion: nothing measured was used"),
         ("lost", "reset", "motion lost and held where it was"),

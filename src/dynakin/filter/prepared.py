@@ -12,7 +12,8 @@ from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.labels import labels
-from dynakin.filter.sources import ContactSources, hidden_segments
+from dynakin.filter.sight import hidden_segments
+from dynakin.filter.sources import ContactSources
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -77,7 +78,7 @@ class Prepared:
             blind = np.isnan(self.wrench).all(axis=1)
             codes = np.where(self.ground.undeclared, ABSENT, np.where(blind, DERIVED, MEASURED))
             sources = np.maximum(sources, codes[:, None]).astype(np.uint8)
-        hidden = hidden_segments(calibrated.spec, self.markers, self.recording.time)
+        hidden = hidden_segments(self.tracker.core_model, calibrated.x0, self.markers, self.recording.time)
         sources[known.unseen(hidden, len(sources))] = ABSENT
         data = xr.Dataset(coords=labels(self.tracker.core_model, calibrated, self.recording.time, self.contacts))
         if self.contacts is not None:

@@ -10,21 +10,17 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.joint_errors import floats
+from dynakin.filter.sight import next_marked
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import (
     ABSENT,
     DERIVED,
-    LEAST_OF_ROOT,
     MEASURED,
     Hidden,
     contact_sources,
-    floating_root,
-    out_of_sight,
     refused_for_long,
-    too_long,
 )
 
 if TYPE_CHECKING:
@@ -43,6 +39,7 @@ def with_sources(
     held: Collection[str] = (),
     unmarked: Collection[str] = (),
     hidden: Hidden | None = None,
+    owners: Sequence[str] = (),
     impossible: Flags | None = None,
     carried: bool = False,
 ) -> xr.Dataset:
@@ -60,8 +57,9 @@ def with_sources(
         undeclared: (T,) frames in which something bears the person that no plate measures.
         soles: segments on which the ground acts. held: coordinates that no marker shows, of which nothing is known.
         unmarked: those of ``soles`` that no marker shows: what they carry is absent, with all that lies before it.
-        hidden: as of `out_of_sight`: while nobody knows how a segment lies (`_gone`), moments of its joints are absent
-            and nothing is known of their angles.
+        hidden: as of `hidden_segments`: while nobody knows how a segment lies, moments of its joints (`_gone`) are
+            absent and nothing is known of their angles, nor of where its markers are.
+        owners: (M,) segments of the markers.
         impossible: (T,) frames whose derived forces are none that the ground gives: these are absent.
         carried: whether the hands carry what the model does not have: what bears it (arms and back) is absent.
     """
@@ -92,7 +90,7 @@ def with_sources(
     joints[np.ix_(undeclared, ~legs)] = ABSENT
     if feet is not None:
         joints[_beyond(feet, soles, segments, parents)] = ABSENT
-    gone = _gone(hidden or {}, segments, parents, len(joints), floating=bool(floating_root(data)))
+    gone = _gone(hidden or {}, segments, parents, len(joints))
     joints[gone] = ABSENT
     if carried:
         joints[:, _over_the_legs([segments.index(name) for name in soles], parents)] = ABSENT
@@ -106,83 +104,28 @@ def with_sources(
     for name in ("coordinates_sd", "speeds_sd", "accelerations_sd"):
         if name in data:
             found[name] = data[name].where(seen)  # held where nobody sees it is not known for sure
+    if "markers_sd" in data and hidden:
+        lost = np.stack([hidden[name] for name in owners], axis=1)
+        found["markers_sd"] = data["markers_sd"].where(xr.DataArray(~lost, dims=("time", "marker")))
     for name in ("moments", "moments_sd"):
         found[name] = data[name].where(xr.DataArray(known, dims=("time", "coordinate")))
     found["joint_loads"] = data["joint_loads"].where(xr.DataArray(borne, dims=("time", "joint")))
     return data.assign(found)  # all at once: each time takes 10 ms
 
 
-def hidden_segments(spec: _core.ModelSpec, markers: Array, time: Array) -> Hidden:
-    """`out_of_sight` by a model's own markers (T, M, 3)."""
-    seen = np.asarray(np.isfinite(markers).any(axis=2))
-    return out_of_sight(seen, [marker.segment for marker in spec.markers], time, root_of(spec))
-
-
-def root_of(spec: _core.ModelSpec) -> str:
-    """The segment that floats; "" of a model that stands on its root."""
-    return next((segment.name for segment in spec.segments if floats(segment)), "")
-
-
-class LiveSight:
-    """`out_of_sight`, frame by frame: what is hidden counts from `UNSEEN_S` on, because nobody knows before how long it
-    will be."""
-
-    def __init__(self, spec: _core.ModelSpec) -> None:
-        owners = [marker.segment for marker in spec.markers]
-        self._segments = list(dict.fromkeys(owners))
-        self._own = [[k for k, owner in enumerate(owners) if owner == segment] for segment in self._segments]
-        root = root_of(spec)
-        self._least = [
-            min(LEAST_OF_ROOT, len(own)) if segment == root else 1
-            for segment, own in zip(self._segments, self._own, strict=True)
-        ]
-        self._lost_s = np.full(len(owners), -np.inf)  # when each was lost; inf: it is seen, -inf: it never was
-        self.used = np.zeros(len(owners), dtype=bool)  # `in_use`
-
-    def look(self, time_s: float, markers: Array) -> Hidden:
-        """Segment -> (1,) whether it is out of sight at this time, by the markers (M, 3); empty where none is."""
-        self._lost_s = np.where(np.isfinite(markers).any(axis=1), np.inf, np.minimum(self._lost_s, time_s))
-        self.used = ~too_long(time_s - self._lost_s)
-        # when the last of each segment's markers was lost, of the root the last but one
-        last = np.array([np.sort(self._lost_s[own])[-n] for own, n in zip(self._own, self._least, strict=True)])
-        hidden = too_long(time_s - last) & np.isfinite(last)
-        return dict(zip(self._segments, hidden[:, None], strict=True)) if hidden.any() else {}
-
-
-def _gone(hidden: Hidden, segments: list[str], parents: npt.NDArray[np.int_], frames: int, *, floating: bool) -> Flags:
-    """(T, J) joints of a segment of which nobody knows how it lies: it is out of sight, and not held between two that
-    are seen, the next that it hangs on and one that hangs on it (by truth a thigh between pelvis and shank is as sure
-    as said; thigh and shank between pelvis and foot were 23 deg off, said 3, in one walk of two). A root that floats
-    hangs on nothing: between three joints' centres 0.1 m apart a pelvis was 21 deg off. Segments that never have
-    markers are passed over.
-    """
+def _gone(hidden: Hidden, segments: list[str], parents: npt.NDArray[np.int_], frames: int) -> Flags:
+    """(T, J) joints of a segment that lies nobody knows how; segments that never have markers are passed over."""
     gone = np.zeros((frames, len(segments)), dtype=bool)
     if not any(own.any() for own in hidden.values()):
         return gone
-    marked = [name in hidden for name in segments]
-    above, beyond = [-1] * len(segments), list[list[int]]([] for _ in segments)  # the next marked ones, itself not
-    for k, parent in enumerate(parents):  # parents stand before their children
-        if parent >= 0:
-            above[k] = int(parent) if marked[parent] else above[parent]
-    for k in reversed(range(len(segments))):
-        if parents[k] >= 0:
-            beyond[parents[k]] += [k] if marked[k] else beyond[k]
-    sight = {k: ~hidden[name] for k, name in enumerate(segments) if marked[k]}
-    sight[-1] = np.full(frames, not floating)  # the ground
-    known = {-1: np.ones(frames, dtype=bool)}
-    for k in range(len(segments)):
-        if marked[k]:
-            known[k] = sight[k] | (sight[above[k]] & _any([sight[own] for own in beyond[k]], frames))
-    for k in range(len(segments)):
-        ends = [k] if marked[k] else beyond[k]
-        gone[:, k] = ~known[above[k]]
+    above, beyond = next_marked(parents, [name in hidden for name in segments])
+    for k, name in enumerate(segments):
+        ends = [k] if name in hidden else beyond[k]
         if ends:
-            gone[:, k] |= ~_any([known[own] for own in ends], frames)
+            gone[:, k] = np.logical_and.reduce([hidden[segments[end]] for end in ends])
+        if above[k] >= 0:
+            gone[:, k] |= hidden[segments[above[k]]]
     return gone
-
-
-def _any(flags: Sequence[Flags], frames: int) -> Flags:
-    return np.logical_or.reduce(flags) if flags else np.zeros(frames, dtype=bool)
 
 
 class ContactSources:
@@ -198,7 +141,6 @@ class ContactSources:
         self._unmarked = unmarked
         self._held = np.array([c.name in held for c in spec.coordinates], dtype=bool)
         self._segments = [segment.name for segment in spec.segments]
-        self._floating = bool(root_of(spec))
         self._parents = np.array([_place(self._segments, segment.parent) for segment in spec.segments])
         self._moved = [self._segments.index(name) for name in moved_segments(spec)]
         self._soles = tuple(soles)
@@ -211,8 +153,8 @@ class ContactSources:
         return cls(initial.spec, initial.feet.values(), initial.held, initial.unmarked_feet.values())
 
     def unseen(self, hidden: Hidden, frames: int) -> Flags:
-        """(T, C) coordinates of joints of which nothing is known, by their segments (`out_of_sight`)."""
-        return _gone(hidden, self._segments, self._parents, frames, floating=self._floating)[:, self._moved]
+        """(T, C) coordinates of joints of which nothing is known, by their segments (`hidden_segments`)."""
+        return _gone(hidden, self._segments, self._parents, frames)[:, self._moved]
 
     def moments(self, feet: ContactLoads | None, *, refused: bool = False, carried: bool = False) -> Codes:
         """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody

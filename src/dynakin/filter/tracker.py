@@ -17,7 +17,8 @@ from dynakin.filter.core_filter import core_filter, smoothed
 from dynakin.filter.noise import prior_factor
 from dynakin.filter.reported_sd import BLOCKS, as_believed
 from dynakin.filter.samples import Sample, sample_arrays
-from dynakin.filter.sources import ContactSources, LiveSight
+from dynakin.filter.sight import LiveSight
+from dynakin.filter.sources import ContactSources
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -83,7 +84,7 @@ class Tracker:
         self._filter.report_sensors(True)
         self._labels = Labels.of(self.core_model)
         self._sources = ContactSources.of(self.calibrated)
-        self._sight = LiveSight(self.calibrated.spec)
+        self._sight = LiveSight(self.core_model)
         self._time: float | None = None
         self._latest: StepEstimate | None = None
         self._stepped: deque[_Stepped] = deque(maxlen=lag + 2)  # and the one before, by which loads change
@@ -184,7 +185,8 @@ class Tracker:
             sources = np.maximum(sources, np.uint8(DERIVED))
         if report.tracking in NO_ESTIMATE:
             sources = np.full_like(sources, ABSENT)
-        unseen = self._sources.unseen(self._sight.look(sample.time_s, markers), 1)[0]
+        refused = np.array(self.verdicts[:-1]) == "refused"
+        unseen = self._sources.unseen(self._sight.look(sample.time_s, markers, self.state, refused), 1)[0]
         sources[unseen] = ABSENT
         blind = feet is not None and bool(feet.blind.any())
         plates_sd = None if feet is None or refused or not feet.by_plates[0] else feet.plates_sd()[0]

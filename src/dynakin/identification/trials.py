@@ -12,7 +12,8 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.sources import ContactSources, hidden_segments, root_of
+from dynakin.filter.sight import hidden_segments, root_of
+from dynakin.filter.sources import ContactSources
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -190,7 +191,7 @@ class Common:
             states[:, at] = values
             own = [names.index(name) for name in self.core.layout.names[at]]
             unfiltered[:, at] = arrays["state"][:, own]
-        hidden = hidden_segments(self.initial.spec, markers, recording.time)
+        hidden = hidden_segments(tracker.core_model, arrays["state"], markers, recording.time, arrays["verdicts"])
         lost = judged.lost | ContactSources.of(start).unseen(hidden, recording.n_frames).any(axis=1)
         doubts = warnings_of([*recording.notes, *start.messages])
         if said := unseen_in_words(hidden, recording.time, root_of(self.initial.spec)):

@@ -14,9 +14,10 @@ import numpy.typing as npt
 from dynakin.filter.ground.closure import smoothed
 from dynakin.filter.ground.lean import root_path
 from dynakin.filter.ground.mass_centre import mass_centre
-from dynakin.filter.sources import hidden_segments, root_of
+from dynakin.filter.sight import owners_of, root_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.times import rate_of
+from dynakin.results.measures.sources import out_of_sight
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -41,7 +42,8 @@ class Needed:
         found = mass_centre(initial, time, markers)
         self.time, self.rate, self.weight = time, rate_of(time), initial.weighed_kg * GRAVITY_M_S2
         self.whole, self.root = not initial.unseen_kg, root_path(initial, markers)
-        unseen = hidden_segments(initial.spec, markers, time).get(root_of(initial.spec), np.False_)
+        root, seen = root_of(initial.spec), np.asarray(np.isfinite(markers).any(axis=2))
+        unseen = out_of_sight(seen, owners_of(initial.spec), time, root).get(root, np.False_)
         self.known: Flags = np.zeros(len(time), dtype=bool) if found is None else found.known & ~unseen
         self.force = np.zeros((len(time), 3)) if found is None else found.needed_force(initial.weighed_kg)
 

@@ -198,9 +198,22 @@ class _Assignment:
             for p in [] if mine else shares:
                 self.on[inside, :, p] |= self.sharing.between[inside, p, None]
             if not mine and not shares:
+                self.off[foot.sets_down_from(stance[0], self.recording.rate) : stance[0], k] = True
                 self.off[reach, k] = True
             else:
                 self.off[inside, k] |= self.beyond_edges(foot, inside)
+        self.off[self.at_the_end(k, foot), k] = True
+
+    def at_the_end(self, k: int, foot: FootContact) -> slice:
+        """The last frames, where a foot may be setting down in them beside the plates: whether it will stand, the
+        recording no longer shows."""
+        n, rate = len(self.off), self.recording.rate
+        first = n if foot.stands[-1] else foot.sets_down_from(n, rate)
+        frames = slice(first, n)
+        leaves = any(first < foot.padded(stance, rate).stop for stance in foot.stances)
+        over = [plate.beyond(foot.outline[-1:]).max() == 0.0 for plate in self.plates if plate.corners is not None]
+        carried = any((self.under[frames, k, p] & plate.loaded[frames]).any() for p, plate in enumerate(self.plates))
+        return slice(n, n) if leaves or carried or any(over) else frames
 
     def resting_on_nothing(self) -> None:
         """Feet off the plates stand on nothing while these bear the person."""

@@ -39,6 +39,9 @@ ALOFT_M = 0.05
 BEFORE_S, AFTER_S = 0.05, 0.15
 """A foot may bear load that long before its markers are slow (heel strike), and after the last one has left the floor
 (push-off: the toe rolls on while the marker over it rises)."""
+SETS_DOWN_M_S, SETS_DOWN_S = 2.0, 0.12
+"""Nearer than `NEAR_SUPPORT_M` and slower than that a foot may be setting down, so long before its markers are slow: of
+truth's walks heels touch at 0.3 to 1.1 m/s, up to 0.09 s before (chosen), of quick ones at 0.5 to 1.5 (judged)."""
 LEVEL_M_S, RESTS_S = 0.15, 0.15
 """A foot rests on something higher where it keeps its height to that speed, for so long: at the top of its swing, or of
 a jump, it does for 0.05 s."""
@@ -67,6 +70,7 @@ class FootContact:
         stands: (T,) in a stance; short gaps closed.
         stances: frames [first, end) of each stance, not padded.
         low: (T,) one of its markers is not high over its own lowest place.
+        near: (T,) one of its markers is near the support and no faster than of a foot that sets down.
         moves: (T,) all of its markers seen move against the support.
         aloft: (T,) it moves, and all of its markers seen are high. A foot on a pedal is aloft too.
     """
@@ -81,6 +85,7 @@ class FootContact:
     stands: Flags
     stances: tuple[tuple[int, int], ...]
     low: Flags
+    near: Flags
     moves: Flags
     aloft: Flags
 
@@ -88,6 +93,13 @@ class FootContact:
         """The frames in which this stance may bear load, as far as markers show."""
         before, after = round(BEFORE_S * rate), round(AFTER_S * rate)
         return slice(max(0, stance[0] - before), min(len(self.stands), stance[1] + after))
+
+    def sets_down_from(self, frame: int, rate: float) -> int:
+        """The first of the frames before this one from which on it may be setting down."""
+        first, reach = frame, round(SETS_DOWN_S * rate) if len(self.near) > 1 else 0  # one frame has no rate
+        while first > max(0, frame - reach) and self.near[first - 1]:
+            first -= 1
+        return first
 
     def bears(self, rate: float) -> Flags:
         """(T,) frames in which one of its stances may bear load, or nobody sees it, or just before or after that."""
@@ -288,15 +300,17 @@ class _Foot:
         with np.errstate(invalid="ignore"):
             over = self.rise - self._between(stances, levels)[:, None]
             high, fast = over > ALOFT_M, (self.speed > SLOW_M_S) & ~self.slow
-            low = np.asarray((np.minimum(over, self.rise) < ALOFT_M).any(axis=1))
+            least = np.minimum(over, self.rise)
+            low = np.asarray((least < ALOFT_M).any(axis=1))
+            near = np.asarray(((least < NEAR_SUPPORT_M) & (self.speed < SETS_DOWN_M_S)).any(axis=1))
         unseen = ~np.isfinite(self.rise)
         moves = np.asarray(self.seen & (fast | unseen).all(axis=1))
         aloft = np.asarray(moves & (high | unseen).all(axis=1))
         under = np.stack(self.near, axis=1) if self.near else np.zeros((len(stands), 0), dtype=bool)
         support = self._between(stances, self._heights(stances, levels))
         return FootContact(
-            self.outline, self.rise, self.seen, under, support, self.belt, self.touching, stands, stances, low, moves,
-            aloft,
+            self.outline, self.rise, self.seen, under, support, self.belt, self.touching, stands, stances, low, near,
+            moves, aloft,
         )  # fmt: skip
 
     def _level(self, first: int, end: int) -> float:

@@ -54,7 +54,8 @@ def plates_bear_all(plates: Sequence[GroundPlate], on: Flags, off: Flags, rises:
     alone = [load for a, b in runs(known & ~off.any(axis=1)) if b - a >= window for load in steady(a, b)]
     weight = max(alone, default=np.inf)
     for first, end in runs(np.asarray(off.any(axis=1))):
-        if end - first >= LEAST_S * rate and known[first:end].all():
-            loads = steady(first, end)
+        start = first if end < len(off) else min(first, max(0, end - round(LEAST_S * rate)))  # it may just set down
+        if end - start >= LEAST_S * rate and known[start:end].all():
+            loads = steady(start, end)
             found[first:end] = min(loads) > (1.0 - LACKS) * weight
     return found

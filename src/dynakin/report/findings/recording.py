@@ -10,7 +10,7 @@ from dynakin.report.labels import short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import LOG
 from dynakin.results.measures.soft_tissue import marker_sites
-from dynakin.results.measures.sources import floating_root, out_of_sight, unseen_in_words
+from dynakin.results.measures.sources import floating_root, out_of_sight, taken_back, unseen_in_words
 from dynakin.results.naming import listed, number, sentence, words
 from dynakin.results.records import REFUSED
 
@@ -44,6 +44,8 @@ def _unseen(estimate: Estimate) -> str:
     segments, time = estimate.marker_segments, estimate.time
     owners = [segments.get(site, "") for _, site in marker_sites(estimate)]
     seen, root = np.isfinite(estimate.values("markers_measured")).any(axis=2), floating_root(estimate.data)
+    if "verdict" in estimate.data:
+        seen = taken_back(seen, estimate.values("verdict")[:, :-1] == REFUSED)
     return unseen_in_words(out_of_sight(seen, owners, time, root), time, root)
 
 

@@ -88,6 +88,17 @@ def out_of_sight(
     return found
 
 
+def taken_back(seen: npt.NDArray[np.bool_], refused: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """(T, M) ``seen`` without frames in which a marker is back, but the filter, which may have lost where its segment
+    is meanwhile, still refuses it."""
+    found = seen.copy()
+    for k in range(seen.shape[1]):
+        for first, end in runs(refused[:, k]):
+            if first > 0 and not seen[first - 1, k]:
+                found[first:end, k] = False
+    return found
+
+
 def unseen_in_words(hidden: Hidden, time: npt.NDArray[np.float64], root: str = "") -> str:
     """A sentence on segments that are `out_of_sight`, and when; "" where none is."""
     spans = {name: [span(time, a, b) for a, b in runs(own)] for name, own in hidden.items()}
