@@ -88,7 +88,7 @@ class Sizes:
 LANDMARKS = Sizes(
     hinge_centre=0.002,
     ball_centre=0.002,
-    spine_centre=0.045,
+    spine_centre=0.04,
     ball_across=0.005,
     hinge_axes=np.radians(2.8),
     pair_axes=np.radians(4.0),
