@@ -32,6 +32,7 @@ import dynakin
 from dynakin.filter.contacts import any_off_plates
 from dynakin.filter.error_sizes import LANDMARKS, SCALED, Sizes, usual_sizes
 from dynakin.filter.reported_sd import BLOCKS, Parts, reported
+from dynakin.filter.skin import skin_found
 from dynakin.filter.systematic import Systematic
 from dynakin.model.definition import load_model
 from dynakin.recordings.times import step_of
@@ -63,7 +64,7 @@ class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
     error at size 1; (T,) intensity of the movement and how far markers are moved; (T, C) where moments come from,
     and whether some foot stands off the plates. Frames that have no truth or no value are NaN. ``late``: whether
-    later frames helped."""
+    later frames helped. ``skin``: as of `skin_found`."""
 
     case: str
     seed: int
@@ -79,6 +80,7 @@ class Run:
     moved_m: Array
     late: bool
     step_s: float
+    skin: float
 
 
 def runs_of(
@@ -188,6 +190,7 @@ def against(
         systematic.moved_m(values_of(data, "state"))[window],
         bool(tracked.estimate.config["lag_s"]),
         step_of(data["time"].values),
+        skin_found(tracker.calibrated, {name: data[name].values for name in ("state", "tracking")}),
     )
 
 
@@ -216,7 +219,7 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     if sizes is not None:
         over_time = run.intensity, run.moved_m, run.sources
         said = reported(
-            sizes, run.variance_scale, run.own, run.parts, *over_time,
+            sizes.with_skin(run.skin), run.variance_scale, run.own, run.parts, *over_time,
             off_plates=run.off_plates, late=run.late, step_s=run.step_s,
         )  # fmt: skip
     for title, block, places in groups_of(run):
@@ -264,7 +267,7 @@ def tell(runs: Sequence[Run], sizes: dict[str, Sizes]) -> None:
 
 def choose(runs: Sequence[Run], kind: str, start: dict[str, Sizes]) -> Sizes:
     """Sizes of one kind of model for which groups lie nearest to 94 % and 1.3, and none is far off."""
-    fixed = ("placed", "inertia")  # beyond `placed` only its ratio to the centres' sizes counts
+    fixed = ("placed", "inertia", "skin_found")  # beyond `placed` only its ratio to the centres' sizes counts
     names = [name for name, value in asdict(start[kind]).items() if value and name not in fixed]
     first = np.log([getattr(start[kind], name) for name in names])
     mine = [run for run in runs if run.sizes == kind]

@@ -8,7 +8,7 @@ import pytest
 from dynakin.bindings import _core
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.joint_errors import followed
-from dynakin.filter.skin import following_skin
+from dynakin.filter.skin import following_skin, skin_found
 from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import load_model
 from dynakin.results.records import FOLLOWING
@@ -97,3 +97,29 @@ def test_nothing_follows_where_it_is_not_wanted(start: Tracker) -> None:
     none = start.changed(start.noise.changed(following_skin_fraction=0.0))
     assert following_skin(none, arrays, time) is None
     assert Noise().following_skin_fraction > 0.0
+
+
+def test_twice_the_skin_is_found_as_twice_whatever_the_joints_do(start: Tracker) -> None:
+    """Over what is declared for joints that turn so; of who hardly moves little is found, of who is lost nothing."""
+    calibrated, names = start.calibrated, list(start.core_model.layout.names)
+
+    def moved(times: float, swing: float) -> dict[str, Array]:
+        _, arrays, _ = bending(start, 0.0)
+        state, knee = arrays["state"], names.index("knee_angle_r")
+        state[:, knee] = state[0, knee] + swing * (state[:, knee] - state[0, knee])
+        K = start.core_model.layout.blocks["coordinates"][1]
+        follows = followed(state[:, :K], calibrated)[:, knee]
+        by_knee = {s.name for s in calibrated.spec.segments if any(a.coordinate == "knee_angle_r" for a in s.axes)}
+        by_knee |= {s.parent for s in calibrated.spec.segments if s.name in by_knee}
+        for marker, declared in zip(calibrated.spec.markers, calibrated.soft_tissue_m, strict=True):
+            for axis in "xyz":
+                if marker.segment in by_knee and (name := f"soft_tissue/{marker.name}/{axis}") in names:
+                    state[:, names.index(name)] = 0.2 * times * declared * follows
+        return arrays
+
+    usual = skin_found(calibrated, moved(1.0, 1.0))
+    assert skin_found(calibrated, moved(2.0, 1.0)) == pytest.approx(2.0 * usual)
+    assert 0.1 < usual < 0.2
+    assert skin_found(calibrated, moved(1.0, 0.1)) < usual
+    lost = moved(1.0, 1.0) | {"tracking": np.full(FRAMES, FOLLOWING + 1)}
+    assert skin_found(calibrated, lost) == 0.0

@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates
-from dynakin.filter.error_sizes import KINDS, LANDMARKS, SCALED, Sizes, usual_sizes
+from dynakin.filter.error_sizes import KINDS, LANDMARKS, OF_JOINTS, SCALED, Sizes, usual_sizes
 from dynakin.filter.in_hands import HANDS, Hands
-from dynakin.filter.joint_errors import JointErrors
+from dynakin.filter.joint_errors import OF_ROOT, JointErrors, neutral, trunks_of
 from dynakin.filter.reported_sd import (
     BLOCKS,
     OWN_AT_ONCE,
@@ -50,10 +50,11 @@ CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
 RATE = np.array([-900.0, 4000.0, 300.0, 200.0, 100.0, 700.0])
 """By how much the contact changes, N and N m a second."""
-SIZES = (0.01, 0.02, 0.03, 0.05, 0.04, 0.06, 0.07, 0.008, 0.3, 0.015, 0.5, 0.004, 2.0)
+SIZES = (0.01, 0.02, 0.025, 0.03, 0.05, 0.04, 0.06, 0.07, 0.09, 0.008, 0.3, 0.015, 0.5, 0.004, 2.0)
 MOVING, MOMENTS_MOVING, OFF_PLATES = 0.1, 0.05, 0.2
 NONE = Sizes(
     *np.zeros(len(SIZES) - 1),
+    skin_found=1.0,
     placed=np.inf,
     own_speeds=MOVING,
     own_moments=MOMENTS_MOVING,
@@ -123,7 +124,7 @@ def calibrated() -> Any:
         names=tuple(_core.Model(model).layout.names),
         x0=_core.Model(model).initial_state(),
         plan=None,
-        feet={},
+        feet={"right": "shank"},
         soft_tissue_m=DECLARED,
         marker_variance=np.zeros(12),
         unmodelled_m=0.0,
@@ -269,15 +270,16 @@ def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_o
     q[5] = 0.3  # rotation
     external = np.zeros((3, 6))
     external[2, 1] = 500.0
-    parts = systematic().parts(q, still, still, external)["root"]
-    expected = np.zeros(3)
+    parts = systematic().parts(q, still, still, external)
     R = rotation(0.3 * Y)
-    for e in (X, Y, Z):
-        turned = Rotation.from_matrix(R @ rotation(1e-6 * e)).as_euler("ZXY") - np.array([0.0, 0.0, 0.3])
-        at_zero = np.array([e[2], e[0], e[1]]) * 1e-6
-        expected += ((turned - at_zero) / 1e-6) ** 2
-    np.testing.assert_allclose(np.sqrt(parts["coordinates"][3:6]), np.sqrt(expected), rtol=0.03, atol=2e-3)
-    assert np.sqrt(parts["moments"][9]) < 1.0
+    for kind, axes in (("root", (X, Y)), ("root_tilt", (Z,))):
+        expected = np.zeros(3)
+        for e in axes:
+            turned = Rotation.from_matrix(R @ rotation(1e-6 * e)).as_euler("ZXY") - np.array([0.0, 0.0, 0.3])
+            at_zero = np.array([e[2], e[0], e[1]]) * 1e-6
+            expected += ((turned - at_zero) / 1e-6) ** 2
+        np.testing.assert_allclose(np.sqrt(parts[kind]["coordinates"][3:6]), np.sqrt(expected), rtol=0.03, atol=2e-3)
+        assert np.sqrt(parts[kind]["moments"][9]) < 1.0
 
 
 def test_a_centre_of_mass_off_its_place_is_that_of_segments_that_are_changed() -> None:
@@ -610,7 +612,8 @@ def test_a_joint_of_which_a_rotation_is_held_is_the_joint_that_it_was() -> None:
 
 
 def test_a_pelvis_is_as_sure_whichever_way_the_person_faces() -> None:
-    """Its tilt and list are about axes of the laboratory: of who faces backwards both change sign, with their zero."""
+    """Its tilt and list are about axes of the laboratory: of who faces backwards both change sign, with their zero.
+    Its frame's own third axis is the one about which it is less sure."""
     standing = measured()
     heading = standing.names.index("pelvis_rotation")
     said = []
@@ -620,10 +623,11 @@ def test_a_pelvis_is_as_sure_whichever_way_the_person_faces() -> None:
         found = Systematic(replace(standing, x0=x0), Noise())
         q = found._reference + 0.05 * np.sin(np.arange(len(found._reference)))
         still = np.zeros_like(q)
-        root = found.parts(q, still, still)["root"]["coordinates"]
-        said.append(root[[standing.names.index(name) for name in ("hip_flexion_r", "knee_angle_r")]])
-        assert (root < 0.3).all()
-    np.testing.assert_allclose(said[1:], [said[0]] * 2, rtol=0.1)
+        parts = found.parts(q, still, still)
+        places = [standing.names.index(name) for name in ("hip_flexion_r", "hip_adduction_r", "hip_rotation_r")]
+        said.append(np.concatenate([parts[kind]["coordinates"][places] for kind in OF_ROOT]))
+        assert all((parts[kind]["coordinates"] < 0.3).all() for kind in OF_ROOT)
+    np.testing.assert_allclose(said[1:], [said[0]] * 2, rtol=0.1, atol=1e-6)
 
 
 def test_of_a_heavy_person_the_tables_are_not_believed_and_that_is_said() -> None:
@@ -636,15 +640,15 @@ def test_of_a_heavy_person_the_tables_are_not_believed_and_that_is_said() -> Non
     assert said.level == "warning" and "100 kg at 1.70 m (35 kg/m2)" in said.text
     identified = replace(heavy, own_inertia=True)
     assert identified.unlike_the_tables() == []
-    assert usual_sizes(identified) == replace(LANDMARKS, skin=wide.skin)
+    assert usual_sizes(identified) == replace(LANDMARKS, skin=wide.skin, skin_found=wide.skin_found)
     for other in (replace(heavy, height_stated=False), replace(heavy, height_m=None), replace(heavy, plan=None)):
         assert not other.heavy and other.unlike_the_tables() == []
 
 
 def test_a_clock_that_is_known_worse_counts_for_more() -> None:
     subject = Systematic(calibrated(), Noise())
-    assert subject.with_ground(0.5 * subject.sizes.clock).sizes == subject.sizes
-    coarse = subject.with_ground(0.01)
+    assert subject.with_found(0.5 * subject.sizes.clock).sizes == subject.sizes
+    coarse = subject.with_found(0.01)
     assert coarse.sizes == replace(subject.sizes, clock=0.01) and subject.sizes.clock < 0.01
     own = dict.fromkeys(BLOCKS, np.zeros(10))
     state = (own, np.r_[Q, QD, QDD], np.zeros((30, 30)), CONTACT[None], ["shank"])
@@ -674,7 +678,7 @@ def test_a_load_in_the_hands_counts_in_the_moments_that_bear_it() -> None:
     elbow, knee = (coordinates.index(name) for name in ("elbow_flex_r", "knee_angle_r"))
     assert 1.0 < np.sqrt(borne[elbow]) < 3.0 and borne[knee] == 0.0
     subject = Systematic(person, Noise())
-    with_it = subject.with_ground(0.0, 3.0)
+    with_it = subject.with_found(0.0, 3.0)
     assert with_it.sizes == replace(subject.sizes, hands=3.0)
     own_sd = {block: np.zeros(len(coordinates)) for block in BLOCKS}
     state: tuple[Any, ...] = (own_sd, x, np.zeros((len(x), len(x))), np.zeros((0, 6)), [])
@@ -706,7 +710,7 @@ def test_a_clock_that_is_off_counts_in_what_contacts_give_as_in_moments() -> Non
         },
         coords={"time": time, "foot_segment": ("foot", ["shank", "pelvis"])},
     )
-    before, after = (systematic().with_ground(clock_s).added_over_time(data, late=True) for clock_s in (0.0, 0.008))
+    before, after = (systematic().with_found(clock_s).added_over_time(data, late=True) for clock_s in (0.0, 0.008))
     for found, clock_s in ((before, LANDMARKS.clock), (after, 0.008)):
         each = np.hypot(3.0, clock_s * np.stack([RATE, 0.5 * RATE]))
         np.testing.assert_allclose(found["foot_wrench_sd"], np.broadcast_to(each, (4, 2, 6)))
@@ -714,6 +718,53 @@ def test_a_clock_that_is_off_counts_in_what_contacts_give_as_in_moments() -> Non
         np.testing.assert_array_equal(found["wrench_sd"][3], np.full(6, 4.0))  # derived: no plate's clock is in it
     assert (after["moments_sd"][:, 9] > before["moments_sd"][:, 9]).all()
     beside = data.assign(foot_contact=(("time", "foot"), np.array([[1, UNMEASURED]] * 4, np.uint8)))
-    found = systematic().with_ground(0.008).added_over_time(beside, late=True)["foot_wrench_sd"]
+    found = systematic().with_found(0.008).added_over_time(beside, late=True)["foot_wrench_sd"]
     np.testing.assert_array_equal(found[:, 0], after["foot_wrench_sd"][:, 0])
     np.testing.assert_array_equal(found[:, 1], np.full((4, 6), 3.0))
+
+
+def test_arms_have_their_zero_where_they_hang() -> None:
+    """Palms lie a quarter turn and more from an angle of 0: a tilted axis of elbows was said to move the forearm all
+    of that way. Trunk and legs stand straight."""
+    person = measured()
+    names = list(person.names)
+    arms = [
+        k for k, name in enumerate(names) if name.endswith(("_r", "_l")) and name.startswith(("arm", "elbow", "pro"))
+    ]
+    x0 = person.x0.copy()
+    for name, angle in (("pro_sup", 2.0), ("elbow_flex", 0.6), ("arm_flex", 0.4), ("hip_flexion", 0.5)):
+        x0[[names.index(f"{name}_{side}") for side in "rl"]] = angle
+    x0[names.index("lumbar_extension")] = -0.2
+    person = replace(person, x0=x0)
+    upright = dict(zip([c.name for c in person.spec.coordinates], neutral(person), strict=True))
+    assert [upright[name] for name in ("pro_sup_r", "elbow_flex_l", "arm_flex_r")] == [2.0, 0.6, 0.4]
+    assert upright["hip_flexion_r"] == upright["lumbar_extension"] == 0.0
+    found = Systematic(person, Noise())
+    q = found._reference.copy()
+    still = np.zeros_like(q)
+    hanging = found.parts(q, still, still)
+    assert all(hanging[kind]["coordinates"][arms].max() < 1e-12 for kind in OF_JOINTS)
+    q[arms] += 0.2
+    moved = sum(LANDMARKS.pair_axes**2 * found.parts(q, still, still)["pair_axes"]["coordinates"][arms])
+    assert 0.0 < np.degrees(np.sqrt(moved)) < 3.0
+
+
+def test_the_spine_is_no_joint_of_one_centre() -> None:
+    """What hangs on the pelvis and bears no foot is less sure of its centre in the sagittal plane, by size and kind."""
+    person = measured()
+    assert trunks_of(person) == {"torso"}
+    found = Systematic(person, Noise())
+    q = found._reference.copy()
+    q[person.names.index("lumbar_bending")] += 0.3
+    still = np.zeros_like(q)
+    parts = found.parts(q, still, still)
+    bending = person.names.index("lumbar_bending")
+    spine, hips = (parts[kind]["coordinates"][bending] for kind in ("spine_centre", "ball_centre"))
+    assert spine > 10.0 * hips and LANDMARKS.spine_centre > 10.0 * LANDMARKS.ball_centre
+
+
+def test_more_skin_than_usual_counts_for_more_and_less_for_no_less() -> None:
+    subject = Systematic(calibrated(), Noise())
+    usual = subject.sizes.skin_found
+    assert subject.with_found(0.0, skin=0.5 * usual).sizes == subject.with_found(0.0).sizes == subject.sizes
+    assert subject.with_found(0.0, skin=2.0 * usual).sizes == replace(subject.sizes, skin=2.0 * subject.sizes.skin)

@@ -14,7 +14,7 @@ from dynakin.model.plan import angles_of
 OF_JOINTS = get_args(Kind)
 KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "limbs", "clock", "hands")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
-CENTRES = ("hinge_centre", "ball_centre", "ball_across")
+CENTRES = ("hinge_centre", "ball_centre", "spine_centre", "ball_across")
 """What goes by how far markers have moved, too."""
 
 
@@ -26,15 +26,19 @@ class Sizes:
         hinge_centre: m, of the centre of a joint with one or two axes (knee, ankle).
         ball_centre, ball_across: m, of the centre of one with three (hip) along the first two axes of its parent
             (forwards and up), and along the third (to the side).
+        spine_centre: m, of the trunk's on the pelvis along the first two: one joint stands for all of the spine's.
         hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar) or
             three.
-        root: rad, of the turn of the pelvis' frame in the pelvis.
+        root, root_tilt: rad, of the turn of the pelvis' frame in the pelvis about its first two axes, and about the
+            third (to the side).
         roll: m/rad, of how far the centre of a joint moves with its angle (knees'), where the model has that.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
         mass_centre: m, of the centre of mass of each segment off where the model has it.
         limbs: part of the distance from its joint by which the centres of mass of a limb that no marker shows lie
             forwards or higher than where it hangs: 0.1 to 0.3 walking, 0.7 in `truth3d`'s squats, 1 stretched out.
         clock: s, of the plates' clock off the markers': less than can be found in a walk.
+        skin_found: part of the declared size that the filter finds where skin moves as usual (`skin.skin_found`): where
+            it finds more, ``skin`` is larger in proportion.
         placed: m, how far (mean) markers may be found from where the model has them, for centres of joints to be as
             sure as said: of a model that was scaled worse to the person both are off, in proportion.
         own_speeds, own_moments: what the factor on the filter's own variance of smoothed speeds and moments grows by
@@ -51,16 +55,19 @@ class Sizes:
 
     hinge_centre: float
     ball_centre: float
+    spine_centre: float
     ball_across: float
     hinge_axes: float
     pair_axes: float
     ball_axes: float
     root: float
+    root_tilt: float
     roll: float
     skin: float
     mass_centre: float
     limbs: float
     clock: float
+    skin_found: float
     placed: float
     own_speeds: float
     own_moments: float
@@ -73,27 +80,35 @@ class Sizes:
         """The errors of joints, skin, centres of mass, limbs and clock times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
 
+    def with_skin(self, found: float) -> Sizes:
+        """Those of a recording in which so much of skin's displacement was found; never less skin than usual."""
+        return replace(self, skin=self.skin * max(1.0, found / self.skin_found))
+
 
 LANDMARKS = Sizes(
     hinge_centre=0.002,
     ball_centre=0.002,
+    spine_centre=0.04,
     ball_across=0.005,
     hinge_axes=np.radians(2.8),
     pair_axes=np.radians(4.0),
     ball_axes=np.radians(0.4),
     root=np.radians(1.0),
+    root_tilt=np.radians(6.0),
     roll=0.0065,
     skin=0.085,
     mass_centre=0.018,
     limbs=0.6,
     clock=0.002,
+    skin_found=0.37,
     placed=np.inf,
     own_speeds=0.13,
     own_moments=0.03,
     vigorous=33.0,
     own_off_plates=0.14,
 )
-"""Joints that are found from markers on the skin."""
+"""Joints that are found from markers on the skin. ``spine_centre``, ``root_tilt`` and ``skin_found`` were chosen on
+simulated walks and squats of four people and judged on those of four others (docs/validation/deviations.md)."""
 UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
 """Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
 (`docs/validation/geometry.md`)."""
@@ -109,16 +124,19 @@ trial has it, of that skin's way (`Site.since_m`)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
     ball_centre=0.0016,
+    spine_centre=0.0016,
     ball_across=0.0016,
     hinge_axes=np.radians(1.3),
     pair_axes=np.radians(1.3),
     ball_axes=np.radians(0.8),
     root=np.radians(0.9),
+    root_tilt=np.radians(0.9),
     roll=0.0,
     skin=0.08,
     mass_centre=0.003,
     limbs=0.6,
     clock=0.002,
+    skin_found=0.3,
     placed=0.003,
     own_speeds=0.06,
     own_moments=0.0,
@@ -137,7 +155,8 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     if not calibrated.heavy:
         return sizes
     farther = 1.0 if calibrated.own_inertia else HEAVY_CENTRE
-    return replace(sizes, mass_centre=farther * sizes.mass_centre, skin=HEAVY_SKIN * sizes.skin)
+    more = {name: HEAVY_SKIN * getattr(sizes, name) for name in ("skin", "skin_found")}
+    return replace(sizes, mass_centre=farther * sizes.mass_centre, **more)
 
 
 def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:

@@ -23,7 +23,7 @@ from dynakin.filter.ground.place import off_place
 from dynakin.filter.ground.plate_sum import doubtful_mass
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
-from dynakin.filter.skin import following_skin, may_follow
+from dynakin.filter.skin import following_skin, may_follow, skin_found
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -328,7 +328,9 @@ class Estimator:
             notes += [place] if place else []
         if tracker.systematic is not None:
             notes += tracker.systematic.misfit(arrays["state"][-1])
-        systematic = tracker.systematic and tracker.systematic.with_ground(ground.clock_sd_s, ground.in_hands_kg)
+        systematic = tracker.systematic and tracker.systematic.with_found(
+            ground.clock_sd_s, ground.in_hands_kg, skin_found(calibrated, arrays)
+        )
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(
             arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances,

@@ -21,10 +21,22 @@ from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.spec import free_coordinates, free_names
 
 Array = npt.NDArray[np.float64]
-Kind = Literal["hinge_centre", "ball_centre", "ball_across", "hinge_axes", "pair_axes", "ball_axes", "root"]
-"""The centre of a joint with one or two axes (hinge) off where it is on its bones, or with three (ball) within its
-parent's sagittal plane and across that; its one axis, two or three turned on both bones; the root's frame turned in its
-bone."""
+Kind = Literal[
+    "hinge_centre",
+    "ball_centre",
+    "spine_centre",
+    "ball_across",
+    "hinge_axes",
+    "pair_axes",
+    "ball_axes",
+    "root",
+    "root_tilt",
+]
+"""The centre of a joint with one or two axes (hinge) off where it is on its bones, or with three (ball; the spine's)
+within its parent's sagittal plane and across that; its one axis, two or three turned on both bones; the root's frame
+turned in its bone, about its third axis (tilt) or another."""
+OF_ROOT: tuple[Kind, ...] = ("root", "root_tilt")
+"""What moves no marker beside its bone."""
 Column = dict[str, float]
 
 _AXES = np.eye(3)
@@ -62,6 +74,7 @@ class JointErrors:
         reference: Array,
         held: Collection[str] = (),
         less_sure: Mapping[str, float] | None = None,
+        trunks: Collection[str] = (),
     ) -> JointErrors:
         """Those of a model.
 
@@ -70,11 +83,12 @@ class JointErrors:
                 own.
             held: coordinates that are locked because no marker shows them: a hip stays a joint with three axes.
             less_sure: segment -> how many times as far off the centre of its joint may be as those of others.
+            trunks: as of `trunks_of`.
         """
         spec = bare(copy(spec))
         orientations = _orientations(spec, reference)
         larger, added = _with_errors(spec)
-        found = _sources(spec, orientations, set(held), less_sure or {})
+        found = _sources(spec, orientations, set(held), less_sure or {}, trunks)
         place = {name: k for k, name in enumerate(free_names(larger))}
         sources = np.array([[column.get(name, 0.0) for _, column in found] for name in added])
         model = _core.Model(larger)
@@ -162,10 +176,14 @@ def _names(segment: str, place: str) -> list[str]:
 
 
 def _sources(
-    spec: _core.ModelSpec, orientations: dict[str, Array], held: set[str], less_sure: Mapping[str, float]
+    spec: _core.ModelSpec,
+    orientations: dict[str, Array],
+    held: set[str],
+    less_sure: Mapping[str, float],
+    trunks: Collection[str],
 ) -> list[tuple[Kind, Column]]:
-    """Unit errors along the ground's axes in the reference posture, of balls' centres along their parent's, by the
-    errors' coordinates that they move."""
+    """Unit errors along the ground's axes in the reference posture, of balls' centres along their parent's, of the
+    root's frame about its own, by the errors' coordinates that they move."""
     planar = not all(spec.markers[0].measured)
     joints = _turning(spec)
     found: list[tuple[Kind, Column]] = []
@@ -176,9 +194,9 @@ def _sources(
         children = [child for child in spec.segments if child.parent == name]
         if segment.parent == "ground":
             if not planar and floats(segment):
-                found += [
-                    ("root", _root_turned(name, R_B, [c for c in children if c.name in joints], e)) for e in _AXES
-                ]
+                jointed = [c for c in children if c.name in joints]
+                kinds: tuple[Kind, ...] = ("root", "root", "root_tilt")
+                found += [(kind, _root_turned(name, R_B, jointed, e)) for kind, e in zip(kinds, R_B.T, strict=True)]
             continue
         R_J = orientations[segment.parent] @ segment.rotation
         own = {axis.coordinate for axis in segment.axes if axis.kind == "rotation"}
@@ -189,11 +207,20 @@ def _sources(
             for child in children:
                 column |= _along(child.name, "moved", R_B @ child.rotation, -e)
             times = less_sure.get(name, 1.0)
-            kind: Kind = "hinge_centre" if axes < 3 else "ball_across" if k == 2 else "ball_centre"
-            found.append((kind, {coordinate: times * v for coordinate, v in column.items()}))
+            found.append(
+                (_centre(axes, k, name in trunks), {coordinate: times * v for coordinate, v in column.items()})
+            )
         if not planar:
             found += [(_TURNED[axes], _along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e)) for e in _AXES]
     return found
+
+
+def _centre(axes: int, direction: int, spine: bool) -> Kind:
+    if axes < 3:
+        return "hinge_centre"
+    if direction == 2:
+        return "ball_across"
+    return "spine_centre" if spine else "ball_centre"
 
 
 def _root_turned(name: str, R_B: Array, children: Sequence[_core.SegmentSpec], e: Array) -> Column:
@@ -216,9 +243,22 @@ def followed(q: Array, calibrated: CalibratedModel) -> Array:
     return np.asarray(np.tanh((q - neutral(calibrated)[free]) / SKIN_ANGLE_RAD))
 
 
+def trunks_of(calibrated: CalibratedModel) -> set[str]:
+    """Segments that hang on one that floats, and that no foot hangs on."""
+    parents = {segment.name: segment.parent for segment in calibrated.spec.segments}
+    with_feet = set()
+    for foot in calibrated.feet.values():
+        while foot in parents:
+            with_feet.add(foot)
+            foot = parents[foot]
+    roots = {segment.name for segment in calibrated.spec.segments if floats(segment)}
+    return {name for name, parent in parents.items() if parent in roots and name not in with_feet}
+
+
 def neutral(calibrated: CalibratedModel) -> Array:
-    """(C,) upright posture: all free coordinates 0, or as near to it as their bounds allow; of the heading with which
-    the person starts, because a pelvis' tilt and list are about axes of the laboratory."""
+    """(C,) upright posture: free coordinates 0, or as near to it as their bounds allow. As the person starts are the
+    heading, because a pelvis' tilt and list are about axes of the laboratory, and what hangs on the trunk: arms stand
+    in no posture of all angles 0 (palms lie a quarter turn and more from it), and markers are put on arms that hang."""
     spec = calibrated.spec
     q = np.array([c.value for c in spec.coordinates], dtype=float)
     free = free_coordinates(spec)
@@ -226,6 +266,11 @@ def neutral(calibrated: CalibratedModel) -> Array:
     q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
     axes = [axis for segment in spec.segments if floats(segment) for axis in segment.axes]
     turns = {axis.coordinate for axis in axes if axis.kind == "rotation" and axis.direction[1]}
+    on = trunks_of(calibrated)
+    for segment in spec.segments:  # children stand after their parents
+        if segment.parent in on:
+            on.add(segment.name)
+            turns |= {axis.coordinate for axis in segment.axes}
     for k, place in enumerate(free):
         if spec.coordinates[place].name in turns:
             q[place] = calibrated.x0[k]

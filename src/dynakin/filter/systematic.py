@@ -20,7 +20,7 @@ from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates, late_by, rates, wrenches_of
 from dynakin.filter.error_sizes import KINDS, OF_JOINTS, Sizes, less_sure_joints, usual_sizes
 from dynakin.filter.in_hands import Hands
-from dynakin.filter.joint_errors import JointErrors, drives, floats, neutral, rolls
+from dynakin.filter.joint_errors import OF_ROOT, JointErrors, drives, floats, neutral, rolls, trunks_of
 from dynakin.filter.limbs import unseen_limbs, unsure_moments
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.filter.reported_sd import BLOCKS, Parts, as_believed, movement_intensity, reported
@@ -71,7 +71,8 @@ class Systematic:
         self._locked = [c.name for c in spec.coordinates if c.locked and c.name not in calibrated.held]
         self._feet = len(calibrated.feet)
         reference = neutral(calibrated)
-        self._errors = JointErrors.of(spec, reference, calibrated.held, less_sure_joints(calibrated))
+        unsure, trunks = less_sure_joints(calibrated), trunks_of(calibrated)
+        self._errors = JointErrors.of(spec, reference, calibrated.held, unsure, trunks)
         self._limbs = unsure_moments(unseen_limbs(calibrated), self._errors.massive)
         self._reference = reference[self._free]
         first = {name: k for k, name in enumerate(calibrated.names)}
@@ -92,7 +93,7 @@ class Systematic:
         x = self._errors.state(self._reference, still, still)
         self._R0 = _core.segment_poses(self._errors.model, x)[0]
         self._D0 = self._displacements(_core.marker_jacobian(self._errors.model, x))
-        self._D0[:, [kind == "root" for kind in self._errors.kinds]] = 0.0
+        self._D0[:, [kind in OF_ROOT for kind in self._errors.kinds]] = 0.0
         self._model = _core.Model(spec)
         self._hands = Hands(spec, self._model)
         self._constants = np.array(calibrated.x0)
@@ -107,11 +108,11 @@ class Systematic:
             k for k, name in enumerate(calibrated.names) if self.sizes.inertia and name.startswith("inertia/")
         ]
 
-    def with_ground(self, clock_sd_s: float, in_hands_kg: float = 0.0) -> Systematic:
-        """The same, where the plates' clock is not known as well as in a walk whose segments are all marked, or the
-        hands may hold something that the model does not have."""
-        other = copy(self)
-        other.sizes = replace(self.sizes, clock=max(clock_sd_s, self.sizes.clock), hands=in_hands_kg)
+    def with_found(self, clock_sd_s: float, in_hands_kg: float = 0.0, skin: float = 0.0) -> Systematic:
+        """The same, where the plates' clock is less sure than in a walk whose segments are all marked, hands may hold
+        what the model does not have, or more of skin's displacement was found than usual."""
+        sizes, other = self.sizes, copy(self)
+        other.sizes = replace(sizes, clock=max(clock_sd_s, sizes.clock), hands=in_hands_kg).with_skin(skin)
         return other
 
     def _displacements(self, jacobian: Array) -> Array:
