@@ -209,6 +209,20 @@ def test_plates_that_carry_nobody_are_as_none_and_warned_of() -> None:
     assert str(found.notes[0]).startswith("Warning: the plates carry nobody") and found.notes[1:] == none.notes
 
 
+def test_a_walk_whose_plates_have_no_numbers_while_they_are_empty_is_measured() -> None:
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    gaps = [(plate.force[:, 1] < 20.0)[:, None] for plate in walk.plates]
+    blank = tuple(
+        replace(p, force=np.where(gap, np.nan, p.force), moment=np.where(gap, np.nan, p.moment))
+        for p, gap in zip(walk.plates, gaps, strict=True)
+    )
+    found, full = (ground_of(walk.with_plates(plates), person("fullbody")) for plates in (blank, walk.plates))
+    assert found.loads is not None and full.loads is not None and found.usable
+    both = found.loads.total_known, full.loads.total_known  # less where a foot sets down or leaves below 20 N
+    assert np.count_nonzero(both[0]) > 0.8 * np.count_nonzero(both[1]) and not (both[0] & ~both[1]).any()
+    assert any("taken as empty there" in text for text in map(str, found.notes))
+
+
 def test_a_walk_beside_plates_that_carry_nobody_runs_from_file_to_result() -> None:
     """What indexes the assignment by the recording's plates finds them there, with nobody on any."""
     walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording

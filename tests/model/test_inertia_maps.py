@@ -81,3 +81,11 @@ def test_consistency_in_space_and_in_the_plane(cloud: tuple[Array, Array]) -> No
     flat = RigidBody(1.0, np.zeros(3), np.diag([0.1, 0.1, 0.5]))
     assert flat.possible_in_plane()
     assert not flat.possible()
+
+
+def test_spread_is_the_covariance_of_where_the_mass_lies() -> None:
+    masses, points = np.array([1.0, 3.0]), np.array([[0.0, 0.2, 0.0], [0.4, 0.0, 0.1]])
+    body = RigidBody.nothing()
+    for mass, point in zip(masses, points, strict=True):
+        body = body + RigidBody.from_centre(mass, point, np.zeros((3, 3)))
+    np.testing.assert_allclose(body.spread, np.cov(points.T, aweights=masses, ddof=0), atol=1e-15)

@@ -64,8 +64,11 @@ def test_sex_not_given_is_the_mean_of_masses_centres_and_signed_tensors() -> Non
 
 def test_trunk_parts_of_de_leva_join() -> None:
     table = load_table("deleva", "male")
-    assert table.part("thorax").length_to == table.part("abdomen").origin
-    assert table.part("abdomen").length_to == table.part("pelvis").origin
+    assert table.part("thorax").length_to.fraction == table.part("abdomen").origin.fraction
+    assert table.part("abdomen").length_to.fraction == table.part("pelvis").origin.fraction
+    for name in ("thorax", "abdomen", "pelvis"):  # as long as from C7, before whose tip the trunk lies
+        part = table.part(name)
+        assert part.length_to in (part.axis_from, Point("c7", "hip", part.axis_from.fraction))
     trunk = [table.part(name).mass_fraction for name in ("thorax", "abdomen", "pelvis")]
     assert sum(trunk) == pytest.approx(0.4346)
 

@@ -11,6 +11,7 @@ import pytest
 from dynakin import read
 from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.blank import without_blanks
 from dynakin.recordings.feet.loads import SWING, UNKNOWN
 from dynakin.recordings.feet.zero_offset import without_offsets
 from dynakin.recordings.frame import find_ground_frame
@@ -240,3 +241,46 @@ def test_gaps_at_push_off_in_a_real_foot_leave_the_plates_where_they_were(
         assert np.abs(loads.wrench - whole.wrench)[known].max() < 25.0
         if trial == "squats1":
             assert known.all() and loads.all_measured.all()
+
+
+def blanked(recording: Recording, blank: dict[str, np.ndarray]) -> Recording:
+    """Without numbers in these frames (T,) of these plates."""
+
+    def of(plate: Plate) -> Plate:
+        gone = blank.get(plate.name, np.zeros(recording.n_frames, dtype=bool))[:, None]
+        values = (np.where(gone, np.nan, each) for each in (plate.force, plate.moment, plate.cop, plate.free_moment))
+        force, moment, cop, free = values
+        return replace(plate, force=force, moment=moment, cop=cop, free_moment=free)
+
+    return recording.with_plates(tuple(of(plate) for plate in recording.plates))
+
+
+def test_plates_without_numbers_while_nobody_is_on_them_are_empty() -> None:
+    """As programs write an empty plate: no frame had all plates."""
+    full = walked().recording
+    gaps = {plate.name: plate.force[:, 1] < 20.0 for plate in full.plates}
+    recording = blanked(full, gaps)
+    assert not foot_loads(recording, LABORATORY, FOOT_MARKERS).total_known.any()
+    found, said = without_blanks(recording, LABORATORY, FOOT_MARKERS)
+    assert [str(each) for each in said] == ["No numbers while no foot is on it: p0, p2, p1, p3, taken as empty there."]
+    loads, before = (foot_loads(each, LABORATORY, FOOT_MARKERS) for each in (found, full))
+    assert np.count_nonzero(loads.all_measured) > 0.9 * np.count_nonzero(before.all_measured)
+    known = loads.total_known
+    np.testing.assert_allclose(found.total_wrench()[known], full.total_wrench()[known], atol=20.0)
+    assert without_blanks(full, LABORATORY, FOOT_MARKERS) == (full, [])
+
+
+@pytest.mark.parametrize("share", [0.3, 1.0])
+def test_what_a_plate_without_numbers_bears_of_a_foot_is_not_known(share: float) -> None:
+    """For a part of a stance, or all of it."""
+    full = walked().recording
+    gaps = {plate.name: plate.force[:, 1] < 20.0 for plate in full.plates}
+    pressed = np.flatnonzero(~gaps["p1"])
+    gone = pressed[: round(share * len(pressed))]
+    gaps["p1"][gone] = True
+    found, _ = without_blanks(blanked(full, gaps), LABORATORY, FOOT_MARKERS)
+    plate = next(plate for plate in found.plates if plate.name == "p1")
+    loads = foot_loads(found, LABORATORY, FOOT_MARKERS)
+    heavy = gone[full.plates[[p.name for p in full.plates].index("p1")].force[gone, 1] > 50.0]
+    assert len(heavy) > 10 and np.isnan(plate.force[heavy]).all()
+    assert not loads.total_known[heavy].any() and np.isnan(loads.wrench[heavy, 1]).all()

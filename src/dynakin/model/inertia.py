@@ -63,6 +63,11 @@ class RigidBody:
         """Centre of mass (3,) m."""
         return self.first_moment / self.mass
 
+    @property
+    def spread(self) -> Array:
+        """Covariance (3, 3) m^2 of where its mass lies, about the centre of mass."""
+        return np.asarray(self.pseudo_inertia[:3, :3] / self.mass - np.outer(self.centre, self.centre))
+
     def rotated(self, R_SB: Array) -> RigidBody:
         """Map 1: the same body with its numbers along the axes of frame S; ``R_SB`` turns B's vectors into
         S's."""

@@ -109,10 +109,14 @@ class ModelPlan:
             sd |= together.sd
         return sd
 
-    def worn_kg(self, priors: Priors) -> float:
-        """Standard deviation of what a segment may weigh more or less than in the table, regardless of its size."""
+    def worn_kg(self, priors: Priors) -> dict[str, float]:
+        """Standard deviation of what each segment may weigh more or less than in the table, regardless of its size."""
+        if not self.model.sided:
+            return {}
         total = sum(body.mass for body in self.inertia.values())
-        return priors.worn_mass_sd_fraction * total if self.model.sided else 0.0
+        shod = {segment.name for segment in self.model.segments if "foot" in segment.parts}
+        fractions = {True: priors.shoe_mass_sd_fraction, False: priors.worn_mass_sd_fraction}
+        return {name: fractions[name in shod] * total for name in self.inertia}
 
     def joint_prior(self, priors: Priors) -> JointPrior | None:
         """What is known together of models in space: the inertia of a segment, all of which
@@ -121,7 +125,9 @@ class ModelPlan:
             return None
         worn_kg = self.worn_kg(priors)
         names = [f"inertia/{name}/{each}" for name in self.inertia for each in INERTIA_NAMES]
-        blocks = [inertia_covariance(body, self.reach[name], priors, worn_kg) for name, body in self.inertia.items()]
+        blocks = [
+            inertia_covariance(body, self.reach[name], priors, worn_kg[name]) for name, body in self.inertia.items()
+        ]
         places = {site.name: site.position for site in self.sites}
         since = {site.name: site.since_m for site in self.sites}
         placed = places_prior(places, {site.name: site.segment for site in self.sites}, priors, since)

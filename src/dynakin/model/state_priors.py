@@ -51,7 +51,7 @@ def state_prior(
     inertia: Mapping[str, RigidBody],
     reach: Mapping[str, float],
     priors: Priors,
-    worn_kg: float = 0.0,
+    worn_kg: Mapping[str, float],
 ) -> dict[str, float]:
     """Standard deviations.
 
@@ -59,7 +59,7 @@ def state_prior(
         kinds: "rotation" or "translation" of each coordinate. lengths: values of the geometry parameters.
         length_sd: of those that are known otherwise than to a part of their value.
         reach: length (m) that a segment's first moments are compared with.
-        worn_kg: standard deviation of what a segment may weigh more or less, regardless of its size.
+        worn_kg: standard deviation of what a segment may weigh more or less, regardless of its size; else none.
     """
     sd: dict[str, float] = {}
     for name, kind in kinds.items():
@@ -74,7 +74,7 @@ def state_prior(
     for marker in markers:
         sd |= {f"marker/{marker}/{axis}": priors.marker_sd_m for axis in "xyz"}
     for segment, body in inertia.items():
-        entry = np.sqrt(np.diag(inertia_covariance(body, reach[segment], priors, worn_kg)))
+        entry = np.sqrt(np.diag(inertia_covariance(body, reach[segment], priors, worn_kg.get(segment, 0.0))))
         sd |= {f"inertia/{segment}/{name}": float(value) for name, value in zip(INERTIA_NAMES, entry, strict=True)}
     return sd
 
@@ -87,7 +87,7 @@ def state_bounds(
     inertia: Mapping[str, RigidBody],
     reach: Mapping[str, float],
     bounds: Bounds,
-    worn_kg: float = 0.0,
+    worn_kg: Mapping[str, float],
 ) -> dict[str, Interval]:
     """Bounds of (9); speeds and accelerations have none.
 
@@ -103,16 +103,20 @@ def state_bounds(
             half = bounds.marker_threshold_m
             found[f"marker/{name}/{axis}"] = (float(at) - half, float(at) + half)
     for segment, body in inertia.items():
-        entry = inertia_bounds(body, reach[segment], bounds, worn_kg)
+        entry = inertia_bounds(body, reach[segment], bounds, worn_kg.get(segment, 0.0))
         found |= {f"inertia/{segment}/{name}": interval for name, interval in entry.items()}
     return found
 
 
 def inertia_covariance(body: RigidBody, length: float, priors: Priors, worn_kg: float) -> Array:
-    """Prior covariance (10, 10) of a segment's inertia: each number by itself, and mass that has the body's shape."""
-    sd = np.array(list(inertia_prior(body, length, priors).values()))
-    per_kg = body.vector / body.mass if body.mass > 0.0 else np.zeros(len(sd))
-    return np.asarray(np.diag(sd**2) + worn_kg**2 * np.outer(per_kg, per_kg))
+    """Prior covariance (10, 10) of a segment's inertia: each number by itself, and mass that has the body's shape, and
+    lies anywhere in it: as far from the centre of mass as the body's own mass does."""
+    found = np.diag(np.square(list(inertia_prior(body, length, priors).values())))
+    if body.mass > 0.0:
+        per_kg = body.vector / body.mass
+        found += worn_kg**2 * np.outer(per_kg, per_kg)
+        found[1:4, 1:4] += worn_kg**2 * body.spread
+    return np.asarray(found)
 
 
 def places_prior(

@@ -16,6 +16,7 @@ from dynakin.filter.ground.judged import Footing, Ground, GroundTrial
 from dynakin.filter.ground.plate_sum import MASS_APART
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.feet.blank import without_blanks
 from dynakin.recordings.feet.zero_offset import without_offsets
 from dynakin.recordings.recording import Recording
 from dynakin.units import GRAVITY_M_S2
@@ -130,18 +131,21 @@ def _taken_in_words(delay: Delay, recording: Recording, whole: bool) -> Message:
 
 
 def _zeroed(trial: GroundTrial) -> tuple[GroundTrial, list[Message]]:
-    """The trial without what its plates read while nobody is on them, with sentences on it; as it is where a
-    contact is declared, which may bear on any plate, or where the person weighs no less than all of it."""
+    """The trial without what its plates read, or do not, while nobody is on them, with sentences on it; as it is where
+    a contact is declared, which may bear on any plate, or where the person weighs no less than all of it."""
     initial = trial.initial
     if not initial.feet or initial.contacts:
         return trial, []
-    recording, said = without_offsets(trial.recording, initial.ground, initial.markers_on_feet)
+    recording, blanks = without_blanks(trial.recording, initial.ground, initial.markers_on_feet)
+    trial = replace(trial, recording=recording)
+    recording, said = without_offsets(recording, initial.ground, initial.markers_on_feet)
+    said = [*blanks, *said]
     if recording is trial.recording:
         return trial, said
     zeroed = replace(trial, recording=recording)
     before, after = (abs(_median_load(each) / (initial.weighed_kg * GRAVITY_M_S2) - 1.0) for each in (trial, zeroed))
     bears = before < MASS_APART and after - before > SUPPORT
-    return (trial, []) if bears else (zeroed, said)
+    return (trial, blanks) if bears else (zeroed, said)
 
 
 def _median_load(trial: GroundTrial) -> float:

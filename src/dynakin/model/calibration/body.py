@@ -16,6 +16,7 @@ from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.blank import without_blanks
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.feet.zero_offset import without_offsets
 from dynakin.recordings.frame import GroundFrame
@@ -76,6 +77,7 @@ def find_mass(
         if not recording.plates:
             reasons.append(f"{recording.name} has no force plates")
             continue
+        recording, _ = without_blanks(recording, ground, foot_markers)
         recording, _ = without_offsets(recording, ground, foot_markers)
         loads = foot_loads(recording, ground, foot_markers)
         check = check_plates(recording, ground, None, foot_markers, loads)

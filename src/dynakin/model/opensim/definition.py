@@ -198,8 +198,8 @@ class OpenSimDefinition:
         together = places_prior(places, {marker.name: marker.body for marker, _ in chosen}, known)
         state, said = starting_state(
             spec,
-            bounds=state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds()),
-            prior=state_prior(kinds, lengths, {}, places, bodies, reach, known) | together.sd,
+            bounds=state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds(), {}),
+            prior=state_prior(kinds, lengths, {}, places, bodies, reach, known, {}) | together.sd,
             table=table,
             speeds={},
         )

@@ -54,8 +54,9 @@ def angle_section(page: Page) -> Section:
     return Section(
         "angles",
         "Joint angles",
-        f"{about} The band is two standard deviations wide on either side, as the filter itself believes; one that "
-        "would hide the line is not drawn, its size stands above the panel.",
+        f"{about} The band is two standard deviations wide on either side, as the filter itself believes. How far that "
+        "zero lies from another model’s, or from a bone’s, is not in it: a degree or more, the same in all frames. A "
+        "band that would hide the line is not drawn, its size stands above the panel.",
         panels,
         lines=side_key(estimate),
         band=BAND,
