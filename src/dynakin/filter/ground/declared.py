@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 import scipy
@@ -9,7 +12,9 @@ import scipy
 from dynakin.arrays import runs, widened
 from dynakin.filter.ground.closure import Closure
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.feet.contact import ALONE_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Recording
@@ -30,29 +35,100 @@ UNDER_M, ALWAYS = 0.3, 0.95
 """A plate is a contact's of its own where it presses within so much of it, horizontally, by the median: a seat is as
 large as that. And where the contact may bear for that part of its load: a foot's plate is loaded while somebody stands,
 too."""
+LOW_M = 0.2
+"""Height of a contact's markers over a plate up to which it, and not the foot beside it, may press there: those of a
+hand on the floor are 0.08 to 0.1 m above it."""
+BETWEEN, OFTEN = 0.2, 0.1
+"""A plate bears a second contact, too, where it presses that part of the way towards it, within `UNDER_M` of the line
+between them, for that part of its load: of hands on plates of their own it is 0.03 to 0.15 of the way (a wrist lies
+behind its palm), of two on one plate 0.45 to 0.55. Chosen on planks and push-ups of one simulated person; hands and
+knees on all fours did not choose."""
 
 
-def plate_of_its_own(
-    recording: Recording, initial: CalibratedModel, loads: FootLoads, paths: Array, may: Flags
-) -> str | None:
-    """The plate of the one contact that is declared: the only one on which no foot ever stands and that presses at it;
-    None where there is no such plate, or more than one of either.
+def plates_of_their_own(
+    recording: Recording,
+    initial: CalibratedModel,
+    loads: FootLoads,
+    paths: Array,
+    may: Flags,
+    assigned: Mapping[str, str],
+) -> dict[str, tuple[str, ...]]:
+    """Plate -> the declared contacts that press it, where nobody said so: one on which no foot ever stands, or that
+    presses nearer to a contact that is low over it than to any foot. Also where somebody did, but it presses between
+    that contact and another one: they share it.
 
     Args:
-        loads: of the feet, by all plates. paths: (T, 2, 3) m, of `ContactPaths`. may: (T, 1) of `may_bear`.
+        loads: of the feet, by all plates. paths: (T, 1 + C, 3) m, of `ContactPaths`. may: (T, C) of `may_bear`.
+        assigned: plate -> foot or contact, as given.
     """
-    if len(initial.contacts) != 1 or loads.given:
-        return None
-    found = []
-    for p, plate in enumerate(recording.plates):
-        own = GroundPlate.of(plate, initial.ground)
-        judged = own.push > JUDGED_N
-        if not judged.any() or loads.on[judged, :, p].any():
+    names = list(initial.contacts)
+    feet = [places for _, places in foot_places(recording, initial.ground, initial.markers_on_feet).values()]
+    pressed = {
+        p: _Pressed.of(GroundPlate.of(plate, initial.ground), paths[:, 1:], may, bool(loads.on[:, :, p].any()), feet)
+        for p, plate in enumerate(recording.plates)
+        if assigned.get(plate.name) not in initial.feet
+    }
+    found = dict[str, tuple[str, ...]]()
+    for p, each in pressed.items():
+        plate = recording.plates[p].name
+        if each is None:
             continue
-        away = np.linalg.norm(own.cop[judged] - paths[judged, 1][:, [0, 2]], axis=1)
-        if float(np.median(away)) < UNDER_M and may[judged, 0].mean() > ALWAYS:
-            found.append(plate.name)
-    return found[0] if len(found) == 1 else None
+        elsewhere = [other for at, other in pressed.items() if other is not None and at != p]
+        free = [
+            c
+            for c, name in enumerate(names)
+            if name not in assigned.values()
+            and not any(other.owned[c] and other.away[c] < each.away[c] for other in elsewhere)
+        ]
+        given = assigned.get(plate)
+        own = [c for c in free if each.owned[c]] if given is None else [names.index(given)]
+        if not own:
+            continue
+        first = own[int(np.argmin(each.away[own]))]
+        others = [c for c in free if c != first and each.presses_towards(first, c)]
+        if given is None or others:
+            found[plate] = tuple(names[c] for c in (first, *others))
+    return found
+
+
+@dataclass(frozen=True)
+class _Pressed:
+    """Where a plate presses while it is judged (K frames): cop (K, 2) m; places (K, C, 2) m of the contacts; away (C,)
+    m by the median; owned (C,) it may be that contact's."""
+
+    cop: Array
+    places: Array
+    away: Array
+    owned: Flags
+
+    @classmethod
+    def of(
+        cls, plate: GroundPlate, places: Array, may: Flags, stood_on: bool, feet: Sequence[Array]
+    ) -> _Pressed | None:
+        """None of a plate on which there is no load to judge."""
+        judged = (plate.push > JUDGED_N) & np.isfinite(plate.cop).all(axis=1)
+        if not judged.any():
+            return None
+        cop = plate.cop[judged]
+        apart = np.linalg.norm(cop[:, None] - places[judged][..., [0, 2]], axis=2)
+        away = np.median(apart, axis=0)
+        owned = (away < UNDER_M) & (may[judged].mean(axis=0) > ALWAYS)
+        if stood_on:
+            low = places[judged, :, 1] - (plate.height_m or 0.0) < LOW_M
+            soles = np.stack([distance_to_hull(cop, each[judged][..., [0, 2]]) for each in feet], axis=1)
+            from_feet = np.where(np.isfinite(soles), soles, np.inf).min(axis=1)[:, None]
+            owned &= (low & (apart < from_feet) & (from_feet > ALONE_M)).mean(axis=0) > ALWAYS
+        return cls(cop, places[judged][..., [0, 2]], away, np.asarray(owned))
+
+    def presses_towards(self, first: int, second: int) -> bool:
+        """Whether some of the load is the second contact's, too, and not the first one's alone."""
+        between = self.places[:, second] - self.places[:, first]
+        length = np.maximum(np.linalg.norm(between, axis=1), 1e-9)
+        along = between / length[:, None]
+        off = self.cop - self.places[:, first]
+        way = (off * along).sum(axis=1) / length
+        beside = np.abs(off[:, 0] * along[:, 1] - off[:, 1] * along[:, 0])
+        return bool(((way > BETWEEN) & (way < 1.0 + BETWEEN) & (beside < UNDER_M)).mean() > OFTEN)
 
 
 def may_bear(initial: CalibratedModel, paths: Array, floor_m: float, tallest_m: float) -> Flags:

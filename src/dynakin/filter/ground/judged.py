@@ -19,7 +19,7 @@ from dynakin.filter.ground.carried import (
     more_than_the_mass,
 )
 from dynakin.filter.ground.coarse_delay import plates_delay
-from dynakin.filter.ground.declared import may_bear, plate_of_its_own
+from dynakin.filter.ground.declared import may_bear, plates_of_their_own
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
@@ -116,7 +116,7 @@ class Footing:
     Attributes:
         loads: of each foot; None of a model that stands on its root.
         may: (T, C) frames in which each declared contact may bear. by_plate: (C,) those that a plate measures; taken:
-            a plate that is one's though nobody said so.
+            plates that are theirs though nobody said so.
         check: of the plates; None without any. shear: what is known of their horizontal forces before they are judged.
         needed: what the motion needs; None of a model that stands on its root.
     """
@@ -125,7 +125,7 @@ class Footing:
     loads: FootLoads | None
     may: Flags
     by_plate: list[bool]
-    taken: str | None
+    taken: Mapping[str, tuple[str, ...]]
     check: PlateCheck | None
     shear: Shear
     needed: Needed | None
@@ -140,10 +140,10 @@ class Footing:
         recording, initial = trial.recording, trial.initial
         loads = _loads_of_feet(trial)
         paths, may = _declared_contacts(initial, trial.markers)
-        taken = None if loads is None else plate_of_its_own(recording, initial, loads, paths, may)
-        if taken is not None:
-            own = {**(trial.assigned or {}), taken: next(iter(initial.contacts))}
-            loads = _loads_of_feet(replace(trial, assigned=own))
+        taken = dict[str, tuple[str, ...]]()
+        if loads is not None and initial.contacts and recording.plates:
+            taken = plates_of_their_own(recording, initial, loads, paths, may, trial.assigned or {})
+            loads = _loads_of_feet(trial, taken) if taken else loads
         by_plate = [loads is not None and name in loads.others for name in initial.contacts]
         may &= ~np.array(by_plate, dtype=bool)
         found = Footing(trial, loads, may, by_plate, taken, None, NO_SHEAR, None)
@@ -206,8 +206,7 @@ class Footing:
         trial, loads, n = self.trial, self.loads, self.trial.recording.n_frames
         recording, initial = trial.recording, trial.initial
         notes, shear, gains = list[Message](), self.shear, NO_GAINS
-        if self.taken is not None:
-            notes.append(note("plates", _taken_in_words(self.taken, next(iter(initial.contacts)))))
+        notes += [note("plates", _taken_in_words(plate, own)) for plate, own in self.taken.items()]
         wrench = trial.wrench
         all_of_it, righted = wrench, None
         if self.needed is not None and loads is not None:
@@ -269,14 +268,20 @@ class Footing:
         return np.where(loads.total_known[:, None], self._all_of_it(needed)[:, :3], np.nan)
 
 
-def _loads_of_feet(trial: GroundTrial) -> FootLoads | None:
-    """What each foot carries by feet and plates; None of a model that stands on its root."""
+def _loads_of_feet(trial: GroundTrial, taken: Mapping[str, tuple[str, ...]] | None = None) -> FootLoads | None:
+    """What each foot carries by feet and plates, of which some are taken as declared contacts'; None of a model that
+    stands on its root."""
     recording, initial, assigned = trial.recording, trial.initial, trial.assigned
     if not initial.feet:  # it takes all plates together, and is told wrong names all the same
         check_assigned(assigned or {}, recording, ("right", "left"))
         return None
     loads = foot_loads(
-        recording, initial.ground, initial.markers_on_feet, assigned=assigned, others=list(initial.contacts)
+        recording,
+        initial.ground,
+        initial.markers_on_feet,
+        assigned=assigned,
+        others=list(initial.contacts),
+        given=taken,
     )
     if not initial.unmarked_feet:
         return loads
@@ -299,10 +304,16 @@ def _declared_contacts(initial: CalibratedModel, markers: Array) -> tuple[Array,
     return paths, may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor)
 
 
-def _taken_in_words(plate: str, contact: str) -> str:
+def _taken_in_words(plate: str, contacts: tuple[str, ...]) -> str:
+    if len(contacts) > 1:
+        names = " and the ".join(contacts)
+        return (
+            f"{plate} is taken as that of the {names}, because it presses between them: how they divide its load is "
+            "assumed."
+        )
     return (
-        f"{plate} is taken as the {contact}'s: no foot stands on it, and it presses where the {contact} is. If it is "
-        f'not, name whose it is in a configuration: plates = {{ "{plate}" = "right" }}.'
+        f"{plate} is taken as the {contacts[0]}'s: it presses where the {contacts[0]} is, and no foot stands there. If "
+        f'it is not, name whose it is in a configuration: plates = {{ "{plate}" = "right" }}.'
     )
 
 
