@@ -45,6 +45,11 @@ behind its palm), of two on one plate 0.45 to 0.55. Chosen on planks and push-up
 knees on all fours did not choose."""
 
 
+AT_PLATE = 0.25
+"""What a push at a plate's centre of pressure leaves of the moments about the ground's origin, over what one at a
+declared contact does (squares): twice as near."""
+
+
 def plates_of_their_own(
     recording: Recording,
     initial: CalibratedModel,
@@ -146,6 +151,19 @@ def may_bear(initial: CalibratedModel, paths: Array, floor_m: float, tallest_m: 
         if initial.contacts
         else (np.zeros((len(paths), 0), dtype=bool))
     )
+
+
+def acts_at(found: Closure, frames: Flags, plate: GroundPlate, places: Array) -> bool:
+    """Whether what the plates' sum lacks, or has too much, acts where a plate is pressed, and not at any of some
+    contacts at (T, C, 3) m."""
+    frames = frames & plate.loaded & np.isfinite(found.excess[:, 1]) & np.isfinite(found.moment).all(axis=1)
+    push, about = found.excess[frames, 1], found.moment[frames]
+
+    def left(place: Array) -> float:  # N^2 m^2, of a push at (K, 2) m
+        return float(np.square(about - push[:, None] * np.stack([-place[:, 1], place[:, 0]], axis=1)).sum())
+
+    others = [left(places[frames, c][:, [0, 2]]) for c in range(places.shape[1])]
+    return bool(frames.any()) and left(plate.cop[frames]) < AT_PLATE * min(others, default=np.inf)
 
 
 def bearing(found: Closure, may: Flags, names: list[str], measured: list[bool], claimed: Flags, rate: float) -> Flags:

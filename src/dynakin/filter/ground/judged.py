@@ -17,16 +17,17 @@ from dynakin.filter.ground.carried import (
     carried_in_words,
     in_hands_in_words,
     more_than_the_mass,
+    unseen_in_hands,
 )
 from dynakin.filter.ground.coarse_delay import plates_delay
-from dynakin.filter.ground.declared import may_bear, plates_of_their_own
+from dynakin.filter.ground.declared import acts_at, may_bear, plates_of_their_own
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
 from dynakin.filter.ground.needed import Needed
-from dynakin.filter.ground.plate_sum import doubtful_mass, judged_by_motion
+from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
-from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear
+from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
@@ -35,9 +36,11 @@ from dynakin.recordings.feet.assignment import check_assigned, foot_loads
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
+from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.plates.stuck import vertical_only
 from dynakin.recordings.recording import Recording
+from dynakin.settings.contacts import SEAT
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -205,13 +208,18 @@ class Footing:
     def _by_motion(self, check: PlateCheck) -> tuple[Ground, Array]:
         trial, loads, n = self.trial, self.loads, self.trial.recording.n_frames
         recording, initial = trial.recording, trial.initial
-        notes, shear, gains = list[Message](), self.shear, NO_GAINS
+        notes, shear, gains, borne = list[Message](), self.shear, NO_GAINS, np.zeros(self.may.shape[1], dtype=bool)
         notes += [note("plates", _taken_in_words(plate, own)) for plate, own in self.taken.items()]
         wrench = trial.wrench
         all_of_it, righted = wrench, None
         if self.needed is not None and loads is not None:
             all_of_it = self._all_of_it(self.needed)
-            said, shear, gains = self._sensors(self.needed, loads)
+            first = None
+            if self._unmeasured:
+                first = judged_by_motion(
+                    recording, initial, trial.markers, [all_of_it], loads, check, self.may, self.by_plate, None
+                )
+            said, shear, gains, borne = self._sensors(self.needed, loads, first)
             notes += said
             righted = gains.righted(wrench, trial.wrenches)
         turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
@@ -219,8 +227,11 @@ class Footing:
         judged = judged_by_motion(
             recording, initial, trial.markers, wrenches, loads, check, self.may, self.by_plate, trial.tolerance
         )
+        judged = judged._replace(bears=judged.bears | (self.may & borne))
         notes += [*check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
         in_hands_kg = 0.0 if loads is None else more_than_the_mass(initial, judged.load_ratio)
+        unseen = [c for c in self._unmeasured if (self.may & ~judged.bears)[:, c].any()]
+        held_kg = 0.0 if loads is None else unseen_in_hands(initial, unseen)
         doubted = doubtful_mass(wrench, initial.weighed_kg, judged.load_ratio, initial.unseen_kg)  # which says it, too
         if in_hands_kg and not about(notes, "carried") and doubted is None:
             notes.append(note("carried", in_hands_in_words(in_hands_kg)))
@@ -240,23 +251,57 @@ class Footing:
         texts = tuple(notes), tuple(reasons)
         off_gain = None if loads is None or not gains.notes else gains.of_feet(loads)
         found = Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, *texts, shear, off_gain)
-        return replace(found, in_hands_kg=in_hands_kg), wrench
+        return replace(found, in_hands_kg=max(in_hands_kg, held_kg)), wrench
 
-    def _sensors(self, needed: Needed, loads: FootLoads) -> tuple[list[Message], Shear, PlateGains]:
-        """What the motion says of the rate, of what is carried, or else of the plates' horizontal forces and gains."""
-        initial, recording, total = self.trial.initial, self.trial.recording, self._total(loads, needed)
-        if initial.contacts:
-            return [], self.shear, NO_GAINS
+    @property
+    def _unmeasured(self) -> list[int]:
+        """Declared contacts that no plate measures."""
+        return [c for c, measured in enumerate(self.by_plate) if not measured]
+
+    def _sensors(
+        self, needed: Needed, loads: FootLoads, first: Carried | None
+    ) -> tuple[list[Message], Shear, PlateGains, Flags]:
+        """What the motion says of the rate, of what is carried, or else of the plates' horizontal forces and gains,
+        where no declared contact may bear that bears at all; and (C,) the contacts that it is laid to.
+
+        Args:
+            first: what is known if all that the plates lack is the declared contacts'; None where none is declared.
+        """
+        initial, recording = self.trial.initial, self.trial.recording
+        bears = np.zeros_like(self.may) if first is None else first.bears
+        free: Flags = np.asarray(~(self.may & bears.any(axis=0)).any(axis=1))
+        touched = np.array([name != SEAT for name in initial.contacts], dtype=bool) & self.may[free].any(axis=0)
+        nobody = np.zeros_like(touched)
+        total = np.where(free[:, None], self._total(loads, needed), np.nan)
         found = fitting_rate(needed, total)
         if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
-            return [warning("rate", wrong_rate_in_words(needed.rate, *found))], self.shear, NO_GAINS
+            return [warning("rate", wrong_rate_in_words(needed.rate, *found))], self.shear, NO_GAINS, nobody
         if (load_kg := carried_in_hands(needed, initial, self.trial.markers, total)) is not None:
-            return [warning("carried", carried_in_words(load_kg))], self.shear, NO_GAINS
+            if not touched.any():
+                return [warning("carried", carried_in_words(load_kg))], self.shear, NO_GAINS, nobody
+            load = f"The plates' force changes as if about {load_kg:.0f} kg were carried in the hands"
+            return [note("carried", _held_in_words(load, initial, touched))], self.shear, NO_GAINS, touched
         if self.shear.unmeasured:
-            return [], self.shear, NO_GAINS
+            return [], self.shear, NO_GAINS, nobody
         shear = found_shear(needed, total)
-        gains = found_gains(needed, recording.plates, self.trial.wrenches, loads.total_known)
-        return [*shear.notes, *gains.notes], shear, gains
+        if any(shear.zero) and touched.any():
+            excess = not_zeroed(*shear.zero, needed.weight)
+            return [note("zero", _held_in_words(excess, initial, touched))], self.shear, NO_GAINS, touched
+        gains = self._gains(needed, loads, free, first)
+        return [*shear.notes, *gains.notes], shear, gains, nobody
+
+    def _gains(self, needed: Needed, loads: FootLoads, free: Flags, first: Carried | None) -> PlateGains:
+        """What is known of them where the declared contacts may bear, too, as far as it acts at the plates."""
+        plates, wrenches = self.trial.recording.plates, self.trial.wrenches
+        gains = found_gains(needed, plates, wrenches, loads.total_known)
+        if not gains.notes or first is None or first.found is None or not first.bears.any():
+            return gains
+        own, during = [1 + c for c in self._unmeasured], np.asarray(first.bears.any(axis=1))
+        places = ContactPaths.of(self.trial.initial).at(self.trial.markers)[:, own]
+        wrong = [GroundPlate.of(plates[p], self.trial.initial.ground) for p in np.flatnonzero(gains.off)]
+        if any(acts_at(first.found, during, plate, places) for plate in wrong):
+            return gains
+        return found_gains(needed, plates, wrenches, loads.total_known & free)
 
     def _all_of_it(self, needed: Needed) -> Array:
         """The total wrench (T, 6), with the motion's horizontal force where plates have none."""
@@ -302,6 +347,14 @@ def _declared_contacts(initial: CalibratedModel, markers: Array) -> tuple[Array,
     paths = ContactPaths.of(initial).at(markers)
     floor = float(np.nanmin(markers[..., 1]))
     return paths, may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor)
+
+
+def _held_in_words(what: str, initial: CalibratedModel, touched: Flags) -> str:
+    names = " and the ".join(name for name, own in zip(initial.contacts, touched, strict=True) if own)
+    return (
+        f"{what}: that is taken as what the {names} bears, and the total wrench is not measured there. If nobody holds "
+        "on to anything, do not declare it."
+    )
 
 
 def _taken_in_words(plate: str, contacts: tuple[str, ...]) -> str:

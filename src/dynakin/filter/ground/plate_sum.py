@@ -43,7 +43,8 @@ _NEARLY_ALL = 0.8
 
 
 class Carried(NamedTuple):
-    """As in `Ground`, by the motion of the centre of mass; beyond (T, F): feet whose plate is not to be believed."""
+    """As in `Ground`, by the motion of the centre of mass; beyond (T, F): feet whose plate is not to be believed;
+    found: what the plates lack, None where nothing can be judged."""
 
     bears: Flags
     undeclared: Flags
@@ -51,6 +52,7 @@ class Carried(NamedTuple):
     load_ratio: float | None
     notes: list[Message]
     reasons: list[Message]
+    found: Closure | None = None
 
 
 def judged_by_motion(
@@ -93,10 +95,12 @@ def judged_by_motion(
         return Carried(
             may, undeclared | (foreign is not None), beyond, None, [*notes, note("plates", UNJUDGED)], reasons
         )
-    bears = bearing(found, may, names, by_plate, claimed, recording.rate)
+    righted = next((each for each in without if each is not None), found)
+    as_it_is = found
+    bears = bearing(righted, may, names, by_plate, claimed, recording.rate)
     if bears.any():
         if (derived := bears & ~undeclared[:, None]).any():
-            reasons.append(note("plates", _declared_in_words(found, derived, names, recording.time)))
+            reasons.append(note("plates", _declared_in_words(righted, derived, names, recording.time)))
         found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
     undeclared |= found.undeclared | _nearly_all(found)
     if found.too_much is not None and loads is not None:  # where the other foot is off the plates, too
@@ -126,7 +130,7 @@ def judged_by_motion(
                 "person.",
             )
         )
-    return Carried(bears, undeclared, beyond, found.load_ratio, notes, reasons)
+    return Carried(bears, undeclared, beyond, found.load_ratio, notes, reasons, as_it_is)
 
 
 def _nearly_all(found: Closure) -> bool:
