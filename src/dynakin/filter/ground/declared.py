@@ -46,8 +46,7 @@ knees on all fours did not choose."""
 
 
 AT_PLATE = 0.25
-"""What a push at a plate's centre of pressure leaves of the moments about the ground's origin, over what one at a
-declared contact does (squares): twice as near."""
+"""Ratio of `acts_at` below which something acts at the plates, and above whose inverse at a contact: twice as near."""
 
 
 def plates_of_their_own(
@@ -153,17 +152,48 @@ def may_bear(initial: CalibratedModel, paths: Array, floor_m: float, tallest_m: 
     )
 
 
-def acts_at(found: Closure, frames: Flags, plate: GroundPlate, places: Array) -> bool:
-    """Whether what the plates' sum lacks, or has too much, acts where a plate is pressed, and not at any of some
-    contacts at (T, C, 3) m."""
-    frames = frames & plate.loaded & np.isfinite(found.excess[:, 1]) & np.isfinite(found.moment).all(axis=1)
-    push, about = found.excess[frames, 1], found.moment[frames]
+def acts_at(found: Closure, frames: Flags, pressed: Array, places: Array, *, mean: bool = False) -> float:
+    """What the excess leaves of the moments about the ground's origin if it acts where plates are pressed, (T, 2) m,
+    over what it leaves at the nearest of some contacts at (T, C, 3) m (squares): less than 1 at the plates.
 
-    def left(place: Array) -> float:  # N^2 m^2, of a push at (K, 2) m
-        return float(np.square(about - push[:, None] * np.stack([-place[:, 1], place[:, 0]], axis=1)).sum())
+    Args:
+        mean: all of the time, by the mean over the frames (T,).
+    """
+    known = np.isfinite(np.column_stack([found.excess, found.moment, pressed])).all(axis=1)
+    frames = frames & known
+    if not frames.any():
+        return 1.0
+    force, about = found.excess[frames], found.moment[frames]
 
-    others = [left(places[frames, c][:, [0, 2]]) for c in range(places.shape[1])]
-    return bool(frames.any()) and left(plate.cop[frames]) < AT_PLATE * min(others, default=np.inf)
+    def left(place: Array) -> float:  # of a force at (K, 3) m
+        lacks = about - np.cross(place, force)[:, [0, 2]]
+        return float(np.square(lacks.mean(axis=0) if mean else lacks).sum())
+
+    plates = left(np.insert(pressed[frames], 1, 0.0, axis=1))
+    return plates / max(min(left(places[frames, c]) for c in range(places.shape[1])), 1e-9)
+
+
+def held_in_words(what: str, initial: CalibratedModel, touched: Flags) -> str:
+    """That something is laid to some of the declared contacts (C,)."""
+    names = " and the ".join(name for name, own in zip(initial.contacts, touched, strict=True) if own)
+    return (
+        f"{what}: that is taken as what the {names} bears, and the total wrench is not measured there. If nobody holds "
+        "on to anything, do not declare it."
+    )
+
+
+def taken_in_words(plate: str, contacts: tuple[str, ...]) -> str:
+    """That a plate is taken as declared contacts'."""
+    if len(contacts) > 1:
+        names = " and the ".join(contacts)
+        return (
+            f"{plate} is taken as that of the {names}, because it presses between them: how they divide its load is "
+            "assumed."
+        )
+    return (
+        f"{plate} is taken as the {contacts[0]}'s: it presses where the {contacts[0]} is, and no foot stands there. If "
+        f'it is not, name whose it is in a configuration: plates = {{ "{plate}" = "right" }}.'
+    )
 
 
 def bearing(found: Closure, may: Flags, names: list[str], measured: list[bool], claimed: Flags, rate: float) -> Flags:

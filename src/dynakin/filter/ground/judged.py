@@ -20,12 +20,19 @@ from dynakin.filter.ground.carried import (
     unseen_in_hands,
 )
 from dynakin.filter.ground.coarse_delay import plates_delay
-from dynakin.filter.ground.declared import acts_at, may_bear, plates_of_their_own
+from dynakin.filter.ground.declared import (
+    AT_PLATE,
+    acts_at,
+    held_in_words,
+    may_bear,
+    plates_of_their_own,
+    taken_in_words,
+)
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
 from dynakin.filter.ground.needed import Needed
-from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
+from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion, pressed_at
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
 from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
@@ -209,7 +216,7 @@ class Footing:
         trial, loads, n = self.trial, self.loads, self.trial.recording.n_frames
         recording, initial = trial.recording, trial.initial
         notes, shear, gains, borne = list[Message](), self.shear, NO_GAINS, np.zeros(self.may.shape[1], dtype=bool)
-        notes += [note("plates", _taken_in_words(plate, own)) for plate, own in self.taken.items()]
+        notes += [note("plates", taken_in_words(plate, own)) for plate, own in self.taken.items()]
         wrench = trial.wrench
         all_of_it, righted = wrench, None
         if self.needed is not None and loads is not None:
@@ -258,6 +265,11 @@ class Footing:
         """Declared contacts that no plate measures."""
         return [c for c, measured in enumerate(self.by_plate) if not measured]
 
+    @property
+    def _places(self) -> Array:
+        """(T, C, 3) m of those."""
+        return ContactPaths.of(self.trial.initial).at(self.trial.markers)[:, [1 + c for c in self._unmeasured]]
+
     def _sensors(
         self, needed: Needed, loads: FootLoads, first: Carried | None
     ) -> tuple[list[Message], Shear, PlateGains, Flags]:
@@ -268,7 +280,7 @@ class Footing:
             first: what is known if all that the plates lack is the declared contacts'; None where none is declared.
         """
         initial, recording = self.trial.initial, self.trial.recording
-        bears = np.zeros_like(self.may) if first is None else first.bears
+        bears = np.zeros_like(self.may) if first is None else first.bears & loads.total_known[:, None]
         free: Flags = np.asarray(~(self.may & bears.any(axis=0)).any(axis=1))
         touched = np.array([name != SEAT for name in initial.contacts], dtype=bool) & self.may[free].any(axis=0)
         nobody = np.zeros_like(touched)
@@ -280,13 +292,18 @@ class Footing:
             if not touched.any():
                 return [warning("carried", carried_in_words(load_kg))], self.shear, NO_GAINS, nobody
             load = f"The plates' force changes as if about {load_kg:.0f} kg were carried in the hands"
-            return [note("carried", _held_in_words(load, initial, touched))], self.shear, NO_GAINS, touched
+            return [note("carried", held_in_words(load, initial, touched))], self.shear, NO_GAINS, touched
         if self.shear.unmeasured:
             return [], self.shear, NO_GAINS, nobody
         shear = found_shear(needed, total)
-        if any(shear.zero) and touched.any():
-            excess = not_zeroed(*shear.zero, needed.weight)
-            return [note("zero", _held_in_words(excess, initial, touched))], self.shear, NO_GAINS, touched
+        if first is not None and first.found is not None:
+            whole = found_shear(needed, self._total(loads, needed))
+            near = acts_at(first.found, loads.total_known, pressed_at(self.trial.wrench), self._places, mean=True)
+            if any(whole.zero) and near < AT_PLATE:
+                shear = whole  # the plates', whoever is declared
+            elif any(shear.zero) and touched.any():
+                said = [note("zero", held_in_words(not_zeroed(*shear.zero, needed.weight), initial, touched))]
+                return said, NO_SHEAR if near * AT_PLATE > 1.0 else replace(shear, notes=()), NO_GAINS, touched
         gains = self._gains(needed, loads, free, first)
         return [*shear.notes, *gains.notes], shear, gains, nobody
 
@@ -294,13 +311,12 @@ class Footing:
         """What is known of them where the declared contacts may bear, too, as far as it acts at the plates."""
         plates, wrenches = self.trial.recording.plates, self.trial.wrenches
         gains = found_gains(needed, plates, wrenches, loads.total_known)
-        if not gains.notes or first is None or first.found is None or not first.bears.any():
+        if not gains.notes or first is None or first.found is None or free[loads.total_known].all():
             return gains
-        own, during = [1 + c for c in self._unmeasured], np.asarray(first.bears.any(axis=1))
-        places = ContactPaths.of(self.trial.initial).at(self.trial.markers)[:, own]
-        wrong = [GroundPlate.of(plates[p], self.trial.initial.ground) for p in np.flatnonzero(gains.off)]
-        if any(acts_at(first.found, during, plate, places) for plate in wrong):
-            return gains
+        for p in np.flatnonzero(gains.off):
+            own = GroundPlate.of(plates[p], self.trial.initial.ground)
+            if acts_at(first.found, first.bears.any(axis=1) & own.loaded, own.cop, self._places) < AT_PLATE:
+                return gains
         return found_gains(needed, plates, wrenches, loads.total_known & free)
 
     def _all_of_it(self, needed: Needed) -> Array:
@@ -347,27 +363,6 @@ def _declared_contacts(initial: CalibratedModel, markers: Array) -> tuple[Array,
     paths = ContactPaths.of(initial).at(markers)
     floor = float(np.nanmin(markers[..., 1]))
     return paths, may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor)
-
-
-def _held_in_words(what: str, initial: CalibratedModel, touched: Flags) -> str:
-    names = " and the ".join(name for name, own in zip(initial.contacts, touched, strict=True) if own)
-    return (
-        f"{what}: that is taken as what the {names} bears, and the total wrench is not measured there. If nobody holds "
-        "on to anything, do not declare it."
-    )
-
-
-def _taken_in_words(plate: str, contacts: tuple[str, ...]) -> str:
-    if len(contacts) > 1:
-        names = " and the ".join(contacts)
-        return (
-            f"{plate} is taken as that of the {names}, because it presses between them: how they divide its load is "
-            "assumed."
-        )
-    return (
-        f"{plate} is taken as the {contacts[0]}'s: it presses where the {contacts[0]} is, and no foot stands there. If "
-        f'it is not, name whose it is in a configuration: plates = {{ "{plate}" = "right" }}.'
-    )
 
 
 def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str | None) -> str:
