@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.filter.ground.declared import plates_of_their_own
+from dynakin.filter.ground.declared import low_beside_feet, plates_of_their_own
 from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.samples import recording_arrays
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import ON_PLATE, SHARED_PLATE
-from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.feet.loads import MEASURED, UNKNOWN, FootLoads
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.trial import simulate
@@ -102,3 +102,20 @@ def test_a_hand_low_over_its_plate_has_it_and_not_the_foot_beside_it() -> None:
         assert whose(pressed("a", beside), paths=low) == owner
     low[:, 1] = loads.soles.middle[:, 0] + [0.0, 0.1, 0.0]
     assert whose(pressed("a", loads.soles.middle[:, 0]), paths=low) == {}  # under the sole, it is the foot's
+
+
+def test_a_declared_hand_low_over_a_foots_plate_may_press_it_too() -> None:
+    """150 N of a hand before the foot were the foot's: a hip 47 N m off, said to 3, and the hand "bore nothing"."""
+    squat, initial, paths, loads = by_hands()
+    low = paths[:, 1:].copy()
+    low[100:150, 0] = loads.soles.middle[100:150, 0] + np.array([0.0, 0.1, 0.0])
+    nothing = np.zeros((len(low), 2), dtype=bool)
+    left, bears = low_beside_feet(squat, initial, loads, low, nothing, [0, 1])
+    assert (left.reason[100:150, 0] == UNKNOWN).all() and (left.reason[:, 1] == MEASURED).all()
+    assert bears[100:150, 0].all() and bears.sum() == 50
+    (said,) = [each.text for each in left.reasons if "is low over" in each.text]
+    assert said.startswith("The hand_right is low over plate 1, on which the right foot stands")
+    beside = nothing.copy()
+    beside[110:120, 0] = True  # the plates lack what it bears: it is beside them
+    assert low_beside_feet(squat, initial, loads, low, beside, [0, 1])[0] is loads
+    assert low_beside_feet(squat, initial, loads, paths[:, 1:], nothing, [0, 1])[0] is loads

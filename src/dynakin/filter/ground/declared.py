@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,8 @@ import scipy
 
 from dynakin.arrays import runs, widened
 from dynakin.filter.ground.closure import Closure
+from dynakin.filter.in_hands import HANDS
+from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import ALONE_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
@@ -18,6 +20,7 @@ from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Recording
+from dynakin.recordings.times import span
 from dynakin.settings.contacts import SEAT
 
 Array = npt.NDArray[np.float64]
@@ -133,6 +136,37 @@ class _Pressed:
         way = (off * along).sum(axis=1) / length
         beside = np.abs(off[:, 0] * along[:, 1] - off[:, 1] * along[:, 0])
         return bool(((way > BETWEEN) & (way < 1.0 + BETWEEN) & (beside < UNDER_M)).mean() > OFTEN)
+
+
+def low_beside_feet(
+    recording: Recording, initial: CalibratedModel, loads: FootLoads, places: Array, bears: Flags, which: list[int]
+) -> tuple[FootLoads, Flags]:
+    """The same without the feet on whose plate declared hands may press as well, because they are low over it and near
+    where it presses, and while they are the plates lack nothing that they bear beside it; and (T, C) when.
+
+    Args:
+        places: (T, K, 3) m of those contacts, by number (``which``), that no plate measures. bears: (T, C) as judged.
+    """
+    feet, found, reasons = np.zeros(loads.on.shape[:2], dtype=bool), np.zeros_like(bears), list[Message]()
+    names, segments = list(initial.contacts), list(initial.contacts.values())
+    for p, plate in enumerate(recording.plates):
+        own = GroundPlate.of(plate, initial.ground)
+        for place, c in zip(places.swapaxes(0, 1), which, strict=True):
+            if segments[c] not in HANDS:  # a shank is low while its own foot stands
+                continue
+            near = np.linalg.norm(place[:, [0, 2]] - own.cop, axis=1) < UNDER_M
+            low = np.asarray(own.loaded & near & (place[:, 1] - (own.height_m or 0.0) < LOW_M))
+            for k, foot in enumerate(loads.feet):
+                for first, end in runs(low & loads.on[:, k, p]):
+                    if bears[first:end, c].any():
+                        continue
+                    feet[first:end, k] = found[first:end, c] = True
+                    text = (
+                        f"The {names[c]} is low over {plate.name}, on which the {foot} foot stands, from "
+                        f"{span(recording.time, first, end)}: what each of them bears is not known there."
+                    )
+                    reasons.append(note("plates", text))
+    return (replace(loads.without(feet), reasons=(*loads.reasons, *reasons)) if reasons else loads), found
 
 
 def may_bear(initial: CalibratedModel, paths: Array, floor_m: float, tallest_m: float) -> Flags:

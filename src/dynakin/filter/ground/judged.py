@@ -24,6 +24,7 @@ from dynakin.filter.ground.declared import (
     AT_PLATE,
     acts_at,
     held_in_words,
+    low_beside_feet,
     may_bear,
     plates_of_their_own,
     taken_in_words,
@@ -235,6 +236,9 @@ class Footing:
             recording, initial, trial.markers, wrenches, loads, check, self.may, self.by_plate, trial.tolerance
         )
         judged = judged._replace(bears=judged.bears | (self.may & borne))
+        if loads is not None and self._unmeasured:
+            loads, low = low_beside_feet(recording, initial, loads, self._places, judged.bears, self._unmeasured)
+            judged = judged._replace(bears=judged.bears | low)
         notes += [*check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
         in_hands_kg = 0.0 if loads is None else more_than_the_mass(initial, judged.load_ratio)
         unseen = [c for c in self._unmeasured if (self.may & ~judged.bears)[:, c].any()]
@@ -243,6 +247,7 @@ class Footing:
         if in_hands_kg and not about(notes, "carried") and doubted is None:
             notes.append(note("carried", in_hands_in_words(in_hands_kg)))
         reasons = [*([VERTICAL_ONLY] if shear.unmeasured else []), *judged.reasons]
+        reasons += [] if loads is None else [said for said in loads.reasons if said not in judged.reasons]
         undeclared = judged.undeclared
         if loads is not None:
             before = loads
