@@ -11,6 +11,7 @@ import scipy
 
 from dynakin.arrays import runs, widened
 from dynakin.filter.ground.closure import Closure
+from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.in_hands import HANDS
 from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -228,6 +229,16 @@ def taken_in_words(plate: str, contacts: tuple[str, ...]) -> str:
         f"{plate} is taken as the {contacts[0]}'s: it presses where the {contacts[0]} is, and no foot stands there. If "
         f'it is not, name whose it is in a configuration: plates = {{ "{plate}" = "right" }}.'
     )
+
+
+def declared_contacts(initial: CalibratedModel, markers: Array) -> tuple[Array, Flags]:
+    """(T, 1 + C, 3) m where the root and the declared contacts are, NaN where none is declared; (T, C) frames in which
+    each of these may bear."""
+    if not initial.contacts:
+        return np.full((len(markers), 1, 3), np.nan), np.zeros((len(markers), 0), dtype=bool)
+    paths = ContactPaths.of(initial).at(markers)
+    floor = float(np.nanmin(markers[..., 1]))
+    return paths, may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor)
 
 
 def bearing(found: Closure, may: Flags, names: list[str], measured: list[bool], claimed: Flags, rate: float) -> Flags:

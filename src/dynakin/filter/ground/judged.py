@@ -23,9 +23,9 @@ from dynakin.filter.ground.coarse_delay import plates_delay
 from dynakin.filter.ground.declared import (
     AT_PLATE,
     acts_at,
+    declared_contacts,
     held_in_words,
     low_beside_feet,
-    may_bear,
     plates_of_their_own,
     taken_in_words,
 )
@@ -150,7 +150,7 @@ class Footing:
         """
         recording, initial = trial.recording, trial.initial
         loads = _loads_of_feet(trial)
-        paths, may = _declared_contacts(initial, trial.markers)
+        paths, may = declared_contacts(initial, trial.markers)
         taken = dict[str, tuple[str, ...]]()
         if loads is not None and initial.contacts and recording.plates:
             taken = plates_of_their_own(recording, initial, loads, paths, may, trial.assigned or {})
@@ -318,10 +318,13 @@ class Footing:
         gains = found_gains(needed, plates, wrenches, loads.total_known)
         if not gains.notes or first is None or first.found is None or free[loads.total_known].all():
             return gains
-        for p in np.flatnonzero(gains.off):
-            own = GroundPlate.of(plates[p], self.trial.initial.ground)
-            if acts_at(first.found, first.bears.any(axis=1) & own.loaded, own.cop, self._places) < AT_PLATE:
-                return gains
+        off = [GroundPlate.of(plates[p], self.trial.initial.ground) for p in np.flatnonzero(gains.off)]
+        during = np.asarray(first.bears.any(axis=1))
+        near = min(acts_at(first.found, during & own.loaded, own.cop, self._places) for own in off)
+        if near < AT_PLATE:
+            return gains
+        if near * AT_PLATE < 1.0:  # nobody can tell
+            return PlateGains(gains.off, np.ones(len(plates)), tuple(note("gain", each.text) for each in gains.notes))
         return found_gains(needed, plates, wrenches, loads.total_known & free)
 
     def _all_of_it(self, needed: Needed) -> Array:
@@ -358,16 +361,6 @@ def _loads_of_feet(trial: GroundTrial, taken: Mapping[str, tuple[str, ...]] | No
         "is not known. Moments are those of a leg whose own foot is on a plate, or in the air."
     )
     return replace(loads, reasons=(*loads.reasons, note("plates", text)))
-
-
-def _declared_contacts(initial: CalibratedModel, markers: Array) -> tuple[Array, Flags]:
-    """(T, 1 + C, 3) m where the root and the declared contacts are, NaN where none is declared; (T, C) frames in which
-    each of these may bear."""
-    if not initial.contacts:
-        return np.full((len(markers), 1, 3), np.nan), np.zeros((len(markers), 0), dtype=bool)
-    paths = ContactPaths.of(initial).at(markers)
-    floor = float(np.nanmin(markers[..., 1]))
-    return paths, may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor)
 
 
 def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str | None) -> str:
