@@ -219,6 +219,14 @@ def test_plates_off_their_place_are_told_by_the_movement(by_m: float, which: int
         assert re.search(f"where the plates have it: {said} .X", found[0]) and "the plates lie elsewhere" in found[0]
 
 
+def test_a_declared_contact_that_bears_nothing_hides_no_plate_off_its_place() -> None:
+    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
+    pressed = walk.plates[0].cop[np.isfinite(walk.plates[0].cop).all(axis=1)]
+    across = int(np.argmin(np.ptp(pressed, axis=0) + 9.0 * np.eye(3)[up]))
+    assert about(person("seat").run(shifted(walk, across, 0.05)).messages, "place")
+
+
 @pytest.mark.parametrize(("by_m", "told"), [(0.0, False), (0.06, True)])
 def test_plates_of_a_real_walk_off_their_place(data_dir: Path, by_m: float, told: bool) -> None:
     folder = data_dir / "opencap_subject4"
