@@ -251,7 +251,7 @@ def test_the_one_plate_that_no_foot_can_own_is_the_one_contacts_that_is_declared
     assert any("plate 3 is taken as the seat's" in message.text for message in notes_of(found.messages))
     assert not any("is taken as" in message.text for message in given.messages)
     one, other = (each.ground.loads for each in (given, found))
-    assert one is not None and other is not None and other.given == one.given == {2: "seat"}
+    assert one is not None and other is not None and other.given == one.given == {2: ("seat",)}
     np.testing.assert_array_equal(other.others["seat"], one.others["seat"])
     np.testing.assert_array_equal(found.wrench, given.wrench)
 

@@ -35,8 +35,8 @@ from dynakin.validation.held_out import measured_wrench
 simulate = cache(simulate_anew)
 
 
-def person() -> Estimator:
-    return Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male")))
+def person(*contacts: str) -> Estimator:
+    return Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male")), contacts=contacts)
 
 
 def with_forces(
@@ -219,6 +219,14 @@ def test_plates_off_their_place_are_told_by_the_movement(by_m: float, which: int
         assert re.search(f"where the plates have it: {said} .X", found[0]) and "the plates lie elsewhere" in found[0]
 
 
+def test_a_declared_contact_that_bears_nothing_hides_no_plate_off_its_place() -> None:
+    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
+    pressed = walk.plates[0].cop[np.isfinite(walk.plates[0].cop).all(axis=1)]
+    across = int(np.argmin(np.ptp(pressed, axis=0) + 9.0 * np.eye(3)[up]))
+    assert about(person("seat").run(shifted(walk, across, 0.05)).messages, "place")
+
+
 @pytest.mark.parametrize(("by_m", "told"), [(0.0, False), (0.06, True)])
 def test_plates_of_a_real_walk_off_their_place(data_dir: Path, by_m: float, told: bool) -> None:
     folder = data_dir / "opencap_subject4"
@@ -364,6 +372,30 @@ def test_plates_that_were_not_zeroed_in_shear_are_told_and_deviations_hold_it(ea
         assert sd[1] == pytest.approx(sd[0], rel=0.05)
 
 
+@pytest.mark.parametrize(
+    ("contact", "each_n", "told", "bears"),
+    [("seat", 12.0, True, False), ("hand_right", 12.0, False, True), ("hand_right", 25.0, True, False)],
+)
+def test_a_declared_contact_switches_no_check_off(contact: str, each_n: float, told: bool, bears: bool) -> None:
+    """Plates that were not zeroed are named where the moments say that nothing pulls at the hand. Where these do not
+    tell, both may be: the hand bears by a prior, and the feet's deviations hold the zero."""
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    off = each_n * forward_of(squat)
+    ready = person(contact).prepare(with_forces(squat, lambda force: force + off))
+    said = about(ready.messages, "zero")
+    assert len(said) == 1 and bool(warnings_of(said)) == told
+    assert ready.ground.bears.all() == ready.ground.bears.any() == bears
+    assert np.hypot(*ready.ground.shear.zero) == pytest.approx(2.0 * each_n, abs=1.5)
+    assert not about(person(contact).prepare(squat).messages, "zero")
+
+
+def test_what_a_declared_hand_may_bear_without_that_it_shows_is_held_by_deviations() -> None:
+    """3 % of the weight in both hands had elbows 1.9 N m off, said to 0.9."""
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    assert person("hand_right").prepare(squat).ground.in_hands_kg == pytest.approx(0.03 * 70.0)
+    assert not person("seat").prepare(squat).ground.in_hands_kg
+
+
 @pytest.mark.parametrize("zero_n", [0.0, 20.0])
 def test_an_error_of_the_motion_that_each_step_repeats_is_no_zero_of_the_plates(zero_n: float) -> None:
     """Of legs that alone are marked: where the vertical force does not close the horizontal one errs too, and what is
@@ -402,10 +434,15 @@ def faster(recording: Recording, factor: float) -> Recording:
     return replace(recording, time=recording.time / factor)
 
 
-@pytest.mark.parametrize(("motion", "factor"), [("gait", 1.2), ("gait", 0.8), ("squat", 1.2), ("squat", 2.0)])
-def test_a_rate_that_does_not_fit_the_forces_is_told_with_one_that_would(motion: str, factor: float) -> None:
+@pytest.mark.parametrize(
+    ("motion", "factor", "contacts"),
+    [("gait", 1.2, ()), ("gait", 0.8, ()), ("squat", 1.2, ()), ("squat", 2.0, ()), ("gait", 1.2, ("hand_right",))],
+)
+def test_a_rate_that_does_not_fit_the_forces_is_told_with_one_that_would(
+    motion: str, factor: float, contacts: tuple[str, ...]
+) -> None:
     whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
-    said = [message.text for message in about(person().prepare(faster(whole, factor)).messages, "rate")]
+    said = [message.text for message in about(person(*contacts).prepare(faster(whole, factor)).messages, "rate")]
     assert len(said) == 1 and f"at {100.0 * factor:.4g} Hz" in said[0] and "Correct the rate" in said[0]
     (fits,) = re.findall(r"About ([0-9.]+) Hz would fit", said[0])
     assert float(fits) == pytest.approx(100.0, abs=6.0)

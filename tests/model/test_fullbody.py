@@ -161,7 +161,7 @@ def test_the_filter_follows_a_moving_body_at_any_heading_without_knowing_which()
     shared = replace(result, data=result.data.assign(foot_contact=contact))
     said = moments(shared, compute_metrics(result))
     assert said is not None and said.level == "warning" and "plate of its own" in said.advice
-    assert said.text.startswith("The right and the left foot shares a plate whenever it stands")
+    assert said.text.startswith("The right foot and the left foot share a plate whenever they bear")
     assert not [event for event in result.events if event.kind == "reset"]
 
 

@@ -91,7 +91,7 @@ def contacts(ready: Prepared) -> Rows:
         text = "; ".join(said[:_MOST_SPANS]) + (f"; and {rest} more" if rest > 0 else "")
         rows.append(("Contacts", f"{foot}: {text or 'never on the ground'}."))
     for name, bears in zip(ready.calibrated.contacts, ready.ground.bears.T, strict=True):
-        own = [names[p] for p, contact in loads.given.items() if contact == name]
+        own = [names[p] for p, contacts in loads.given.items() if name in contacts]
         rows.append(("Contacts", f"{name} (declared): {listed(own) if own else _times(time, bears)}."))
     return rows
 
@@ -131,7 +131,7 @@ def _plates(ready: Prepared) -> str:
         for k, foot in enumerate(loads.feet)
         if (names := listed([plate.name for p, plate in enumerate(plates) if loads.on[:, k, p].any()] or [""]))
     ]
-    bears += [f"{plates[p].name} under the {name}" for p, name in loads.given.items()]
+    bears += [f"{plates[p].name} under the {' and the '.join(own)}" for p, own in loads.given.items()]
     used = f"{', '.join(bears)}" if bears else "no foot stands on any"
     return f"{len(plates)}: {used}."
 

@@ -101,8 +101,8 @@ def _contact_in_words(name: str, found: dict[str, Any]) -> str:
     if not found["frames"]:
         return (
             f"The {name}, declared, bears nothing in this recording that shows (less than {100.0 * STATED:.0f} % of "
-            "the weight all the time would pass for a mass that is off, and what it bears on a foot's plate for the "
-            "foot's: give it a plate of its own)."
+            "the weight all the time would pass for a mass that is off: of a hand, deviations of moments of arms and "
+            "L5/S1 hold as much; and what it bears on a foot's plate for the foot's: give it a plate of its own)."
         )
     how = listed([f"{what} in {found[what]}" for what in MEANINGS if found[what]])
     size = ""

@@ -123,7 +123,7 @@ def check_plates(
             findings.say(f"{plate.name} carries nothing ({'standing' if standing else 'the whole recording'}).")
             continue
         if p in loads.given:
-            findings.say(f"{plate.name} bears the {loads.given[p]}.")
+            findings.say(f"{plate.name} bears the {' and the '.join(loads.given[p])}.")
             continue
         hidden = [name for name, own in (foot_markers or {}).items() if not own]
         refused = len(findings.refusals)

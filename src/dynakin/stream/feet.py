@@ -59,7 +59,7 @@ class LiveFeet:
             raise ConfigError(f"plates: {unknown[0]!r} is given a plate, expected one of {expected}")
         contacts = [p for p, name in given.items() if name in initial.contacts]
         assigned_feet = {p: self.feet.index(name) for p, name in given.items() if name in self.feet}
-        self._given = {p: given[p] for p in contacts}
+        self._given = {p: (given[p],) for p in contacts}
         self._stances = LiveStances(initial)
         self._owners = PlateOwners(len(self.feet), len(plates), assigned_feet, contacts)
         self._paths = ContactPaths.of(initial)

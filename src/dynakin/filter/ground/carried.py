@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import mean_seen
+from dynakin.filter.ground.closure import STATED
 from dynakin.filter.ground.mass_centre import second_derivative
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_sum import UNSEEN_APART
@@ -105,6 +106,13 @@ def more_than_the_mass(initial: CalibratedModel, load_ratio: float | None) -> fl
     more = load_ratio - 1.0
     usual = MORE + UNSEEN_APART * initial.unseen_kg / initial.weighed_kg
     return more * initial.weighed_kg if more > usual else 0.0
+
+
+def unseen_in_hands(initial: CalibratedModel, contacts: Iterable[int]) -> float:
+    """Mass, kg, whose weight declared contacts, by number, may bear at the hands without that it shows; 0 where none of
+    them is at a hand."""
+    segments = list(initial.contacts.values())
+    return STATED * initial.weighed_kg if any(segments[c] in HANDS for c in contacts) else 0.0
 
 
 def in_hands_in_words(more_kg: float) -> str:

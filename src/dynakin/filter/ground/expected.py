@@ -109,7 +109,8 @@ def expected_loads(
     wrench[:, :F] = np.where((feet == ON_PLATE)[..., None], loads.wrench, filled(loads.wrench))
     for k, name in enumerate(initial.contacts, start=F):
         if (measured := loads.others.get(name)) is not None:
-            contact[:, k] = np.where(measured.any(axis=1), ON_PLATE, NO_CONTACT)
+            on = SHARED_PLATE if any(name in group for group in loads.sharing) else ON_PLATE
+            contact[:, k] = np.where(measured.any(axis=1), on, NO_CONTACT)
             contact[np.isnan(measured).any(axis=1), k] = UNMEASURED
             wrench[:, k] = filled(measured)
     wrench[:, :K][contact == NO_CONTACT] = 0.0
@@ -143,8 +144,11 @@ def expected_loads(
                 Prior(prior.mean[on], prior.spread[on]), wrench[on, k], errors[on, k, :, k]
             )
         errors[off, k, :, k] = _about(root[off], np.array([_WHITE_N] * 3 + [_WHITE_NM] * 3))
-    for t in np.flatnonzero((contact == SHARED_PLATE).any(axis=1)):
-        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors, places, shear, gains)
+    own = list(initial.contacts)
+    for group in (range(F), *([F + own.index(name) for name in names] for names in loads.sharing)):
+        shares = contact[:, group] == SHARED_PLATE
+        for t in np.flatnonzero(shares.any(axis=1)):
+            _divide(int(t), np.asarray(group)[shares[t]], priors, wrench, errors, places, shear, gains)
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -246,7 +250,7 @@ def _about(point: Array, sd: Array) -> Array:
 
 def _divide(
     t: int,
-    feet: npt.NDArray[np.intp],
+    feet: npt.NDArray[np.int64],
     priors: dict[int, Prior],
     wrench: Array,
     errors: Array,

@@ -17,16 +17,25 @@ from dynakin.filter.ground.carried import (
     carried_in_words,
     in_hands_in_words,
     more_than_the_mass,
+    unseen_in_hands,
 )
 from dynakin.filter.ground.coarse_delay import plates_delay
-from dynakin.filter.ground.declared import may_bear, plate_of_its_own
+from dynakin.filter.ground.declared import (
+    AT_PLATE,
+    acts_at,
+    declared_contacts,
+    held_in_words,
+    low_beside_feet,
+    plates_of_their_own,
+    taken_in_words,
+)
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
 from dynakin.filter.ground.needed import Needed
-from dynakin.filter.ground.plate_sum import doubtful_mass, judged_by_motion
+from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion, pressed_at
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
-from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear
+from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
@@ -35,9 +44,11 @@ from dynakin.recordings.feet.assignment import check_assigned, foot_loads
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
+from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.plates.stuck import vertical_only
 from dynakin.recordings.recording import Recording
+from dynakin.settings.contacts import SEAT
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -116,7 +127,7 @@ class Footing:
     Attributes:
         loads: of each foot; None of a model that stands on its root.
         may: (T, C) frames in which each declared contact may bear. by_plate: (C,) those that a plate measures; taken:
-            a plate that is one's though nobody said so.
+            plates that are theirs though nobody said so.
         check: of the plates; None without any. shear: what is known of their horizontal forces before they are judged.
         needed: what the motion needs; None of a model that stands on its root.
     """
@@ -125,7 +136,7 @@ class Footing:
     loads: FootLoads | None
     may: Flags
     by_plate: list[bool]
-    taken: str | None
+    taken: Mapping[str, tuple[str, ...]]
     check: PlateCheck | None
     shear: Shear
     needed: Needed | None
@@ -139,11 +150,11 @@ class Footing:
         """
         recording, initial = trial.recording, trial.initial
         loads = _loads_of_feet(trial)
-        paths, may = _declared_contacts(initial, trial.markers)
-        taken = None if loads is None else plate_of_its_own(recording, initial, loads, paths, may)
-        if taken is not None:
-            own = {**(trial.assigned or {}), taken: next(iter(initial.contacts))}
-            loads = _loads_of_feet(replace(trial, assigned=own))
+        paths, may = declared_contacts(initial, trial.markers)
+        taken = dict[str, tuple[str, ...]]()
+        if loads is not None and initial.contacts and recording.plates:
+            taken = plates_of_their_own(recording, initial, loads, paths, may, trial.assigned or {})
+            loads = _loads_of_feet(trial, taken) if taken else loads
         by_plate = [loads is not None and name in loads.others for name in initial.contacts]
         may &= ~np.array(by_plate, dtype=bool)
         found = Footing(trial, loads, may, by_plate, taken, None, NO_SHEAR, None)
@@ -205,14 +216,18 @@ class Footing:
     def _by_motion(self, check: PlateCheck) -> tuple[Ground, Array]:
         trial, loads, n = self.trial, self.loads, self.trial.recording.n_frames
         recording, initial = trial.recording, trial.initial
-        notes, shear, gains = list[Message](), self.shear, NO_GAINS
-        if self.taken is not None:
-            notes.append(note("plates", _taken_in_words(self.taken, next(iter(initial.contacts)))))
+        notes, shear, gains, borne = list[Message](), self.shear, NO_GAINS, np.zeros(self.may.shape[1], dtype=bool)
+        notes += [note("plates", taken_in_words(plate, own)) for plate, own in self.taken.items()]
         wrench = trial.wrench
         all_of_it, righted = wrench, None
         if self.needed is not None and loads is not None:
             all_of_it = self._all_of_it(self.needed)
-            said, shear, gains = self._sensors(self.needed, loads)
+            first = None
+            if self._unmeasured:
+                first = judged_by_motion(
+                    recording, initial, trial.markers, [all_of_it], loads, check, self.may, self.by_plate, None
+                )
+            said, shear, gains, borne = self._sensors(self.needed, loads, first)
             notes += said
             righted = gains.righted(wrench, trial.wrenches)
         turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
@@ -220,12 +235,19 @@ class Footing:
         judged = judged_by_motion(
             recording, initial, trial.markers, wrenches, loads, check, self.may, self.by_plate, trial.tolerance
         )
+        judged = judged._replace(bears=judged.bears | (self.may & borne))
+        if loads is not None and self._unmeasured:
+            loads, low = low_beside_feet(recording, initial, loads, self._places, judged.bears, self._unmeasured)
+            judged = judged._replace(bears=judged.bears | low)
         notes += [*check.messages, *([warning("plates", f"{turned}.")] if turned else []), *judged.notes]
         in_hands_kg = 0.0 if loads is None else more_than_the_mass(initial, judged.load_ratio)
+        unseen = [c for c in self._unmeasured if (self.may & ~judged.bears)[:, c].any()]
+        held_kg = 0.0 if loads is None else unseen_in_hands(initial, unseen)
         doubted = doubtful_mass(wrench, initial.weighed_kg, judged.load_ratio, initial.unseen_kg)  # which says it, too
         if in_hands_kg and not about(notes, "carried") and doubted is None:
             notes.append(note("carried", in_hands_in_words(in_hands_kg)))
         reasons = [*([VERTICAL_ONLY] if shear.unmeasured else []), *judged.reasons]
+        reasons += [] if loads is None else [said for said in loads.reasons if said not in judged.reasons]
         undeclared = judged.undeclared
         if loads is not None:
             before = loads
@@ -241,23 +263,69 @@ class Footing:
         texts = tuple(notes), tuple(reasons)
         off_gain = None if loads is None or not gains.notes else gains.of_feet(loads)
         found = Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, *texts, shear, off_gain)
-        return replace(found, in_hands_kg=in_hands_kg), wrench
+        return replace(found, in_hands_kg=max(in_hands_kg, held_kg)), wrench
 
-    def _sensors(self, needed: Needed, loads: FootLoads) -> tuple[list[Message], Shear, PlateGains]:
-        """What the motion says of the rate, of what is carried, or else of the plates' horizontal forces and gains."""
-        initial, recording, total = self.trial.initial, self.trial.recording, self._total(loads, needed)
-        if initial.contacts:
-            return [], self.shear, NO_GAINS
+    @property
+    def _unmeasured(self) -> list[int]:
+        """Declared contacts that no plate measures."""
+        return [c for c, measured in enumerate(self.by_plate) if not measured]
+
+    @property
+    def _places(self) -> Array:
+        """(T, C, 3) m of those."""
+        return ContactPaths.of(self.trial.initial).at(self.trial.markers)[:, [1 + c for c in self._unmeasured]]
+
+    def _sensors(
+        self, needed: Needed, loads: FootLoads, first: Carried | None
+    ) -> tuple[list[Message], Shear, PlateGains, Flags]:
+        """What the motion says of the rate, of what is carried, or else of the plates' horizontal forces and gains,
+        where no declared contact may bear that bears at all; and (C,) the contacts that it is laid to.
+
+        Args:
+            first: what is known if all that the plates lack is the declared contacts'; None where none is declared.
+        """
+        initial, recording = self.trial.initial, self.trial.recording
+        bears = np.zeros_like(self.may) if first is None else first.bears & loads.total_known[:, None]
+        free: Flags = np.asarray(~(self.may & bears.any(axis=0)).any(axis=1))
+        touched = np.array([name != SEAT for name in initial.contacts], dtype=bool) & self.may[free].any(axis=0)
+        nobody = np.zeros_like(touched)
+        total = np.where(free[:, None], self._total(loads, needed), np.nan)
         found = fitting_rate(needed, total)
         if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
-            return [warning("rate", wrong_rate_in_words(needed.rate, *found))], self.shear, NO_GAINS
+            return [warning("rate", wrong_rate_in_words(needed.rate, *found))], self.shear, NO_GAINS, nobody
         if (load_kg := carried_in_hands(needed, initial, self.trial.markers, total)) is not None:
-            return [warning("carried", carried_in_words(load_kg))], self.shear, NO_GAINS
+            if not touched.any():
+                return [warning("carried", carried_in_words(load_kg))], self.shear, NO_GAINS, nobody
+            load = f"The plates' force changes as if about {load_kg:.0f} kg were carried in the hands"
+            return [note("carried", held_in_words(load, initial, touched))], self.shear, NO_GAINS, touched
         if self.shear.unmeasured:
-            return [], self.shear, NO_GAINS
+            return [], self.shear, NO_GAINS, nobody
         shear = found_shear(needed, total)
-        gains = found_gains(needed, recording.plates, self.trial.wrenches, loads.total_known)
-        return [*shear.notes, *gains.notes], shear, gains
+        if first is not None and first.found is not None:
+            whole = found_shear(needed, self._total(loads, needed))
+            near = acts_at(first.found, loads.total_known, pressed_at(self.trial.wrench), self._places, mean=True)
+            if any(whole.zero) and near < AT_PLATE:
+                shear = whole  # the plates', whoever is declared
+            elif any(shear.zero) and touched.any():
+                said = [note("zero", held_in_words(not_zeroed(*shear.zero, needed.weight), initial, touched))]
+                return said, NO_SHEAR if near * AT_PLATE > 1.0 else replace(shear, notes=()), NO_GAINS, touched
+        gains = self._gains(needed, loads, free, first)
+        return [*shear.notes, *gains.notes], shear, gains, nobody
+
+    def _gains(self, needed: Needed, loads: FootLoads, free: Flags, first: Carried | None) -> PlateGains:
+        """What is known of them where the declared contacts may bear, too, as far as it acts at the plates."""
+        plates, wrenches = self.trial.recording.plates, self.trial.wrenches
+        gains = found_gains(needed, plates, wrenches, loads.total_known)
+        if not gains.notes or first is None or first.found is None or free[loads.total_known].all():
+            return gains
+        off = [GroundPlate.of(plates[p], self.trial.initial.ground) for p in np.flatnonzero(gains.off)]
+        during = np.asarray(first.bears.any(axis=1))
+        near = min(acts_at(first.found, during & own.loaded, own.cop, self._places) for own in off)
+        if near < AT_PLATE:
+            return gains
+        if near * AT_PLATE < 1.0:  # nobody can tell
+            return PlateGains(gains.off, np.ones(len(plates)), tuple(note("gain", each.text) for each in gains.notes))
+        return found_gains(needed, plates, wrenches, loads.total_known & free)
 
     def _all_of_it(self, needed: Needed) -> Array:
         """The total wrench (T, 6), with the motion's horizontal force where plates have none."""
@@ -269,14 +337,20 @@ class Footing:
         return np.where(loads.total_known[:, None], self._all_of_it(needed)[:, :3], np.nan)
 
 
-def _loads_of_feet(trial: GroundTrial) -> FootLoads | None:
-    """What each foot carries by feet and plates; None of a model that stands on its root."""
+def _loads_of_feet(trial: GroundTrial, taken: Mapping[str, tuple[str, ...]] | None = None) -> FootLoads | None:
+    """What each foot carries by feet and plates, of which some are taken as declared contacts'; None of a model that
+    stands on its root."""
     recording, initial, assigned = trial.recording, trial.initial, trial.assigned
     if not initial.feet:  # it takes all plates together, and is told wrong names all the same
         check_assigned(assigned or {}, recording, ("right", "left"))
         return None
     loads = foot_loads(
-        recording, initial.ground, initial.markers_on_feet, assigned=assigned, others=list(initial.contacts)
+        recording,
+        initial.ground,
+        initial.markers_on_feet,
+        assigned=assigned,
+        others=list(initial.contacts),
+        given=taken,
     )
     if not initial.unmarked_feet:
         return loads
@@ -287,23 +361,6 @@ def _loads_of_feet(trial: GroundTrial) -> FootLoads | None:
         "is not known. Moments are those of a leg whose own foot is on a plate, or in the air."
     )
     return replace(loads, reasons=(*loads.reasons, note("plates", text)))
-
-
-def _declared_contacts(initial: CalibratedModel, markers: Array) -> tuple[Array, Flags]:
-    """(T, 1 + C, 3) m where the root and the declared contacts are, NaN where none is declared; (T, C) frames in which
-    each of these may bear."""
-    if not initial.contacts:
-        return np.full((len(markers), 1, 3), np.nan), np.zeros((len(markers), 0), dtype=bool)
-    paths = ContactPaths.of(initial).at(markers)
-    floor = float(np.nanmin(markers[..., 1]))
-    return paths, may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor)
-
-
-def _taken_in_words(plate: str, contact: str) -> str:
-    return (
-        f"{plate} is taken as the {contact}'s: no foot stands on it, and it presses where the {contact} is. If it is "
-        f'not, name whose it is in a configuration: plates = {{ "{plate}" = "right" }}.'
-    )
 
 
 def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str | None) -> str:

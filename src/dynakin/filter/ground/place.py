@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import filled
 from dynakin.bindings import _core
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.judged import Ground
@@ -14,6 +15,7 @@ from dynakin.filter.limbs import unseen_limbs
 from dynakin.messages import Message, about, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.naming import listed
+from dynakin.settings.contacts import SEAT
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -25,6 +27,8 @@ bent by it, shows half to all."""
 OFF_UNSEEN_M = 0.1
 """So much more by the part of the mass that no marker shows: at 0.38 of it 12 to 57 mm, at 0.07 up to 24. Arms that
 no marker shows may be stretched out all the time."""
+STEADIED_M = 0.03
+"""So much more where a declared contact bears nothing that shows: `STATED` of the weight, a metre up."""
 BEARS = 0.3
 """Part of the weight from which the plates' load shows where it acts."""
 
@@ -41,10 +45,11 @@ def off_place(
         states: (T, n). measured: (T, 6) total wrench by the plates. names: of the plates.
     """
     loads, weight = ground.loads, initial.weighed_kg * GRAVITY_M_S2
-    if loads is None or not names or initial.contacts or about(ground.notes, "rate") or says_carried(ground.notes):
+    if loads is None or not names or about(ground.notes, "rate") or says_carried(ground.notes):
         return None
     limbs = sum(sum(limb.values()) for limb in unseen_limbs(initial))
     limit = OFF_PLACE_M + (OFF_UNSEEN_M * initial.unseen_kg + limbs) / initial.weighed_kg
+    limit += STEADIED_M * any(name != SEAT and name not in loads.others for name in initial.contacts)
     inertia = [k for k, name in enumerate(initial.names) if name.startswith("inertia/")]
     posed = states.copy()
     posed[:, inertia] = initial.x0[inertia]
@@ -56,6 +61,8 @@ def off_place(
             apart[k] = _pressed(measured[k]) - _pressed(needed)
     bears = np.isfinite(apart).all(axis=1)
     alone = bears & (loads.on.any(axis=1).sum(axis=1) == 1)
+    for own in loads.others.values():
+        alone &= ~filled(own).any(axis=1)
     cases = {names[p]: alone & loads.on[:, :, p].any(axis=1) for p in range(len(names))}
     whole = "the plates together" if len(names) > 1 else names[0]
     by_name = {name: _apart(apart[own], loads.soles.rate, limit) for name, own in {whole: bears, **cases}.items()}

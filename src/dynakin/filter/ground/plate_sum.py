@@ -18,6 +18,7 @@ from dynakin.recordings.checks import PlateCheck
 from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.times import spans
 from dynakin.recordings.weight import likely_unit
@@ -43,7 +44,8 @@ _NEARLY_ALL = 0.8
 
 
 class Carried(NamedTuple):
-    """As in `Ground`, by the motion of the centre of mass; beyond (T, F): feet whose plate is not to be believed."""
+    """As in `Ground`, by the motion of the centre of mass; beyond (T, F): feet whose plate is not to be believed;
+    found: what the plates lack, None where nothing can be judged."""
 
     bears: Flags
     undeclared: Flags
@@ -51,6 +53,7 @@ class Carried(NamedTuple):
     load_ratio: float | None
     notes: list[Message]
     reasons: list[Message]
+    found: Closure | None = None
 
 
 def judged_by_motion(
@@ -93,10 +96,12 @@ def judged_by_motion(
         return Carried(
             may, undeclared | (foreign is not None), beyond, None, [*notes, note("plates", UNJUDGED)], reasons
         )
-    bears = bearing(found, may, names, by_plate, claimed, recording.rate)
+    righted = next((each for each in without if each is not None), found)
+    as_it_is = found
+    bears = bearing(righted, may, names, by_plate, claimed, recording.rate)
     if bears.any():
         if (derived := bears & ~undeclared[:, None]).any():
-            reasons.append(note("plates", _declared_in_words(found, derived, names, recording.time)))
+            reasons.append(note("plates", _declared_in_words(righted, derived, names, recording.time)))
         found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
     undeclared |= found.undeclared | _nearly_all(found)
     if found.too_much is not None and loads is not None:  # where the other foot is off the plates, too
@@ -126,7 +131,7 @@ def judged_by_motion(
                 "person.",
             )
         )
-    return Carried(bears, undeclared, beyond, found.load_ratio, notes, reasons)
+    return Carried(bears, undeclared, beyond, found.load_ratio, notes, reasons, as_it_is)
 
 
 def _nearly_all(found: Closure) -> bool:
@@ -214,6 +219,12 @@ def _undeclared_in_words(
             "sum is not used there.",
         )
     ), beyond
+
+
+def pressed_at(wrench: Array) -> Array:
+    """(T, 2) m, X and Z of where a wrench (T, 6) presses on the ground's plane, NaN where it does not."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(wrench[:, [1]] > LOADED_N, wrench[:, [5, 3]] * [1.0, -1.0] / wrench[:, [1]], np.nan)
 
 
 def _stands_alone(loads: FootLoads, k: int, frames: slice) -> bool:

@@ -49,6 +49,7 @@ def foot_loads(
     *,
     assigned: Mapping[str, str] | None = None,
     others: Sequence[str] = (),
+    given: Mapping[str, tuple[str, ...]] | None = None,
 ) -> FootLoads:
     """Give each plate's load to the foot that stands on it.
 
@@ -56,7 +57,8 @@ def foot_loads(
         ground: the frame and origin of the wrenches.
         foot_markers: foot -> names of the markers on it, and on its toes.
         assigned: plate -> foot or declared contact, where the user knows better (the whole recording).
-        others: names of the contacts that are declared.
+        others: names of the contacts that are declared. given: plate -> those of them that bear on it and share it, in
+            the place of what `assigned` says.
 
     Raises:
         ConfigError: `assigned` names a plate, foot or contact that there is not.
@@ -67,7 +69,8 @@ def foot_loads(
     forward = ground.vectors_to_ground(ground.forward)[[0, 2]]
     contacts = foot_contacts(recording, ground, foot_markers, plates)
     contacts = like_the_other(contacts, plates, forward, recording.rate)
-    return _Assignment(recording, ground, tuple(foot_markers), contacts, plates, fixed, forward).loads()
+    owners = {name: (owner,) for name, owner in fixed.items() if owner not in foot_markers} | dict(given or {})
+    return _Assignment(recording, ground, tuple(foot_markers), contacts, plates, fixed, owners, forward).loads()
 
 
 def check_assigned(fixed: Mapping[str, str], recording: Recording, bearers: tuple[str, ...]) -> None:
@@ -116,15 +119,15 @@ class _Assignment:
         contacts: dict[str, FootContact],
         plates: list[GroundPlate],
         fixed: dict[str, str],
+        given: dict[str, tuple[str, ...]],
         forward: Array,
     ) -> None:
         self.recording, self.ground, self.feet = recording, ground, feet
-        self.contacts, self.plates, self.fixed = contacts, plates, fixed
+        self.contacts, self.plates, self.fixed = contacts, plates, fixed | {name: own[0] for name, own in given.items()}
         self.forward, self.sharing = forward, Sharing.of(list(contacts.values()), plates, forward, recording)
         n, F, P = recording.n_frames, len(feet), len(plates)
         self.step = round(STEP_S * recording.rate) if n > 1 else 0  # frames
-        owners = [fixed.get(plate.name) for plate in plates]
-        self.given = {p: owner for p, owner in enumerate(owners) if owner is not None and owner not in feet}
+        self.given = {p: given[plate.name] for p, plate in enumerate(plates) if plate.name in given}
         self.on = np.zeros((n, F, P), dtype=bool)  # this foot stands on this plate
         self.off = np.zeros((n, F), dtype=bool)  # it may stand off the plates
         self.hidden = np.zeros((n, F), dtype=bool)  # nobody sees it, and it may stand anywhere

@@ -44,8 +44,10 @@ class FootLoads:
         aloft: (T, F) feet that are surely in the air: by their markers, and because no load that is nobody's is near.
         soles: where the feet's soles are, when they may bear load, and where it is expected.
         on: (T, F, P) which foot stands on which plate: the run's one assignment.
-        given: number of a plate -> the declared contact that bears on it, where it is no foot's.
-        others: declared contact -> (T, 6) wrench of the plates that were given to it, as ``wrench``.
+        given: number of a plate -> the declared contacts that bear on it, where it is no foot's: one, or several that
+            share it.
+        others: declared contact -> (T, 6) wrench of the plates that were given to it, as ``wrench``; of one that it
+            shares an equal part.
         messages: sentences with times. reasons: those of them that say why something is not measured.
     """
 
@@ -58,10 +60,20 @@ class FootLoads:
     aloft: Flags
     soles: Soles
     on: Flags
-    given: Mapping[int, str] = field(default_factory=dict)
+    given: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     others: Mapping[str, Array] = field(default_factory=dict)
     messages: tuple[Message, ...] = ()
     reasons: tuple[Message, ...] = ()
+
+    @property
+    def sharing(self) -> list[tuple[str, ...]]:
+        """Declared contacts of whose loads the sum alone is measured, because they share a plate."""
+        groups = list[tuple[str, ...]]()
+        for names in (each for each in self.given.values() if len(each) > 1):
+            joined = [group for group in groups if set(group) & set(names)]
+            groups = [group for group in groups if group not in joined]
+            groups.append(tuple(dict.fromkeys(name for group in (*joined, names) for name in group)))
+        return groups
 
     def with_undeclared(self, frames: Flags) -> FootLoads:
         """The same where something bears the person in these frames (T,) that no plate measures: the total is not
@@ -114,7 +126,7 @@ def divided(
     off: Flags,
     hidden: Flags,
     aloft: Flags,
-    given: Mapping[int, str] | None = None,
+    given: Mapping[int, tuple[str, ...]] | None = None,
 ) -> FootLoads:
     """The plates' wrenches given to the feet that stand on them.
 
@@ -122,7 +134,7 @@ def divided(
         marked: (F,) the foot has markers.
         on: (T, F, P) this foot stands on this plate. off: (T, F) it may stand off the plates. hidden: (T, F) it may
             stand anywhere: nobody sees it. aloft: (T, F) it is in the air by its markers.
-        given: number of a plate -> the declared contact that bears on it, where it is no foot's.
+        given: as of `FootLoads`.
     """
     given = dict(given or {})
     n, F = off.shape
@@ -144,10 +156,11 @@ def divided(
             aloft &= ~lost[:, None] | (away > NOT_ITS_M)
             nobodys |= lost
     others: dict[str, Array] = {}
-    for p, name in given.items() if plates else ():
+    for p, names in given.items() if plates else ():
         bears = np.linalg.norm(filled(plates[p].wrench[:, :3]), axis=1) > UNLOADED_N
-        share = np.where(bears[:, None], plates[p].wrench, 0.0)
-        others[name] = others.get(name, 0.0) + np.where(known[:, p, None], share, np.nan)
+        share = np.where(bears[:, None], plates[p].wrench, 0.0) / len(names)
+        for name in names:
+            others[name] = others.get(name, 0.0) + np.where(known[:, p, None], share, np.nan)
     reason[alone.any(axis=2)] = MEASURED
     reason[both.any(axis=2)] = SHARED
     reason[(owners & ~known[:, None, of_feet]).any(axis=2)] = UNKNOWN

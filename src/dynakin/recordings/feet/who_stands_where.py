@@ -24,7 +24,7 @@ class WhoStandsWhere:
     """
     Attributes:
         time: (T,) s. feet: names. contacts: of those with markers. plates: P.
-        fixed: plate -> foot or contact, as given. given: place of a plate -> the declared contact that it bears.
+        fixed: plate -> foot or contact, as given. given: place of a plate -> the declared contacts on it.
         on: (T, F, P) this foot stands on this plate. off: (T, F) it may stand off the plates. hidden: (T, F) nobody
             sees it, and it may stand anywhere.
     """
@@ -34,7 +34,7 @@ class WhoStandsWhere:
     contacts: Mapping[str, FootContact]
     plates: Sequence[GroundPlate]
     fixed: Mapping[str, str]
-    given: Mapping[int, str]
+    given: Mapping[int, tuple[str, ...]]
     on: Flags
     off: Flags
     hidden: Flags
@@ -83,7 +83,9 @@ class WhoStandsWhere:
     def _owners(self, p: int) -> list[Message]:
         plate, owners, found = self.plates[p], self.on[:, :, p], list[Message]()
         if p in self.given:
-            found.append(note("plates", f"{plate.name} carries the {self.given[p]}."))
+            names = self.given[p]
+            shared = ": how they divide its load is assumed" if len(names) > 1 else ""
+            found.append(note("plates", f"{plate.name} carries the {' and the '.join(names)}{shared}."))
         for k, foot in enumerate(self.feet):
             if owners[:, k].any():
                 how = "given" if plate.name in self.fixed else "by its centre of pressure"

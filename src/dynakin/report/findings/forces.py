@@ -39,8 +39,9 @@ def moments(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if shared:
         advice = "Record it with each foot on a plate of its own."
     if always:
-        feet = " and ".join(f"the {name}" for name in always)
-        text.insert(0, f"{sentence(feet)} foot shares a plate whenever it stands: moments are guesses then.")
+        each = listed([f"the {name}{' foot' if name in ('right', 'left') else ''}" for name in always])
+        share, bear = ("shares", "it bears") if len(always) == 1 else ("share", "they bear")
+        text.insert(0, f"{sentence(each)} {share} a plate whenever {bear}: moments are guesses then.")
     # steps off the plates are usual and flagged; a leg without a measured frame is not what was recorded for
     missed = always or any(not count["measured"] for count in found["legs"].values())
     return Insight("warning" if missed else "note", "Joint moments", " ".join(text), advice)
