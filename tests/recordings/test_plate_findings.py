@@ -240,3 +240,16 @@ def test_gaps_at_push_off_in_a_real_foot_leave_the_plates_where_they_were(
         assert np.abs(loads.wrench - whole.wrench)[known].max() < 25.0
         if trial == "squats1":
             assert known.all() and loads.all_measured.all()
+
+
+@pytest.mark.parametrize(("height_m", "taken_off"), [(0.05, False), (0.5, True)])
+def test_a_steady_hand_on_a_plate_is_no_zero_of_it(height_m: float, taken_off: bool) -> None:
+    """Of all fours with the hands on plates 90 N were taken off, and L5/S1 was 88 N m off, said to 9."""
+    made = walked().recording
+    idle = with_read(made, "p0", np.full(made.n_frames, 60.0), alone=True)
+    plate = next(plate for plate in idle.plates if plate.name == "p0")
+    hand = np.nanmean(plate.cop, axis=0) + [0.1, height_m, 0.05]
+    markers = np.concatenate([idle.markers, np.tile(hand, (made.n_frames, 1, 1))], axis=1)
+    found, said = zeroed(replace(idle, marker_names=(*idle.marker_names, "RFIN"), markers=markers))
+    assert bool(said) == taken_off
+    assert (np.abs(next(plate.force for plate in found.plates if plate.name == "p0")).max() < 1.0) == taken_off
