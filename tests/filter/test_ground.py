@@ -14,6 +14,7 @@ import pytest
 
 import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
+from dynakin.arrays import runs
 from dynakin.cli.prepared import assumed
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.closure import closure
@@ -80,6 +81,20 @@ def test_plates_that_carry_the_person_are_found_to(model: str, motion: str, seed
     assert found is not None and not found.undeclared.any() and not ground.undeclared.any()
     assert np.sqrt(np.nanmean(found.excess**2, axis=0)).max() < 0.02 * WEIGHT
     assert found.load_ratio == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("break_s", "pulls"), [(0.3, 1), (1.5, 2)])
+def test_a_short_break_in_what_pulls_is_none(break_s: float, pulls: int) -> None:
+    """Of a stroller that was pushed arms were measured in breaks of 0.1 s: elbows 4 N m off, said to 0.9."""
+    recording = simulate("sagittal7", "squat", 11, 12.0).recording
+    estimator = person("sagittal7")
+    initial = estimator.start(recording).calibrated
+    markers, wrench, _ = estimator._measured(recording, initial)
+    time = recording.time - recording.time[0]
+    pulled = (time > 3.0) & (time < 7.0) & ~((time > 5.0) & (time < 5.0 + break_s))
+    more = wrench + np.outer(pulled, [0.1 * WEIGHT, 0.0, 0.0, 0.0, 0.0, 0.0])
+    found = closure(initial, recording.time, markers, more, np.ones(len(wrench), dtype=bool))
+    assert found is not None and len(runs(found.undeclared)) == pulls
 
 
 @pytest.mark.parametrize("seed", [11, 12])
