@@ -248,7 +248,7 @@ def test_a_steady_hand_on_a_plate_is_no_zero_of_it(height_m: float, taken_off: b
     made = walked().recording
     idle = with_read(made, "p0", np.full(made.n_frames, 60.0), alone=True)
     plate = next(plate for plate in idle.plates if plate.name == "p0")
-    hand = np.nanmean(plate.cop, axis=0) + [0.1, height_m, 0.05]
+    hand = np.nanmean(plate.cop, axis=0) + np.array([0.1, height_m, 0.05])
     markers = np.concatenate([idle.markers, np.tile(hand, (made.n_frames, 1, 1))], axis=1)
     found, said = zeroed(replace(idle, marker_names=(*idle.marker_names, "RFIN"), markers=markers))
     assert bool(said) == taken_off

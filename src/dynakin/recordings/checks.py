@@ -11,8 +11,9 @@ import numpy as np
 
 from dynakin.messages import Findings, Message, note, warning
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.contact import COP_REFUSED_M, NEAR_M, foot_places
+from dynakin.recordings.feet.contact import COP_REFUSED_M, NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.feet.places import foot_places
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import SHOE_M

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import mean_seen, runs
 from dynakin.messages import Message, note, warning
-from dynakin.recordings.feet.contact import filled_by_others, foot_places
+from dynakin.recordings.feet.places import filled_by_others, foot_places
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.orientation import axis_vector
