@@ -314,7 +314,8 @@ def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str |
     if not initial.contacts:
         return (
             f". If a chair, a hand or a knee is on {plate}, declare it (--contact seat, hand_right or knee=shank_l), "
-            "else correct the plate's place or its unit"
+            "else the plate's place or its unit is wrong, or the forces are of another trial, or in other axes than "
+            "the markers (turned about the vertical, say)"
         )
     if not names:
         return ""
