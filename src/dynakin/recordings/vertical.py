@@ -25,7 +25,8 @@ FLOOR_M = 0.10
 or a back that is on the floor 0.02 to 0.08; along any other axis it is where the person happens to be."""
 UNDER_M = 0.30
 """How far from below the middle of the markers plates push that bear a person alone: of who stands or is on hands and
-toes 0.20, of who lies 0.25 (legs have most markers); hands push a wall 0.4 above the middle."""
+toes 0.20, of who lies 0.25 (legs have most markers); hands push a wall 0.4 above the middle (chosen, as `FLOOR_M`, on
+simulated push-ups and who lies; judged on planks, a side plank and all fours)."""
 
 
 @dataclass(frozen=True)
@@ -101,8 +102,8 @@ def _surer_than_the_body(recording: Recording, body: str, standing: _StandingFlo
     """
     plates = _from_plates(recording)
     upright = standing.vertical if standing else body
-    if plates not in (None, body) and _bear(recording, plates or body, from_below=plates != upright):
-        return plates or body
+    if plates is not None and plates != body and _bear(recording, plates, from_below=plates != upright):
+        return plates
     if standing is None or body in (upright, plates) or walks(recording, axis_vector(body)):
         return body
     own, other = (standing.lies_under(recording, axis) for axis in (body, upright))
