@@ -83,6 +83,22 @@ def test_plates_that_carry_the_person_are_found_to(model: str, motion: str, seed
     assert found.load_ratio == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.parametrize(("away_m", "borne"), [(0.0, False), (0.8, True)])
+def test_without_plates_nothing_is_the_feets_alone_where_they_are_not_under_the_person(
+    away_m: float, borne: bool
+) -> None:
+    """The feet had all of who is on hands and toes: L5/S1 was "measured" to 9 N m, and 171 off."""
+    recording = simulate("fullbody", "squat", 11, 12.0).recording
+    estimator = person("fullbody")
+    initial = estimator.start(recording).calibrated
+    feet = [recording.marker_names.index(name) for own in initial.markers_on_feet.values() for name in own]
+    markers = recording.markers.copy()
+    markers[:, feet] += np.array([away_m, 0.0, 0.0])
+    _, _, ground = estimator._measured(replace(recording.with_plates(()), markers=markers), initial)
+    assert (ground.undeclared == borne).all()
+    assert any("bears the person beyond both feet" in message.text for message in ground.reasons) == borne
+
+
 @pytest.mark.parametrize(("break_s", "pulls"), [(0.3, 1), (1.5, 2)])
 def test_a_short_break_in_what_pulls_is_none(break_s: float, pulls: int) -> None:
     """Of a stroller that was pushed arms were measured in breaks of 0.1 s: elbows 4 N m off, said to 0.9."""

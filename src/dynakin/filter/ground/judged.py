@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.axes import turned_axes
+from dynakin.filter.ground.beyond_feet import beyond_in_words, beyond_the_feet
 from dynakin.filter.ground.carried import (
     carried_in_hands,
     carried_in_words,
@@ -199,8 +200,15 @@ class Footing:
             "how they divide it is assumed; inertial parameters stay as the table has them."
         )
         said, wrench = note("plates", text), self.trial.wrench
-        nowhere = np.zeros(len(wrench), dtype=bool)
-        return Ground(self.loads, nowhere, self.may, False, None, (said,), (said,)), wrench
+        initial, recording = self.trial.initial, self.trial.recording
+        if self.loads is None or initial.contacts:
+            return Ground(
+                self.loads, np.zeros(len(wrench), dtype=bool), self.may, False, None, (said,), (said,)
+            ), wrench
+        beyond = beyond_the_feet(initial, recording, self.trial.markers)
+        reasons = [said, *([beyond_in_words(beyond, recording.time)] if beyond.any() else [])]
+        loads = self.loads.with_undeclared(beyond)
+        return Ground(loads, beyond, self.may, False, None, (said,), tuple(reasons)), wrench
 
     def _by_motion(self, check: PlateCheck) -> tuple[Ground, Array]:
         trial, loads, n = self.trial, self.loads, self.trial.recording.n_frames
