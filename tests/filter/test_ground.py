@@ -96,7 +96,7 @@ def test_without_plates_nothing_is_the_feets_alone_where_they_are_not_under_the_
     markers[:, feet] += np.array([away_m, 0.0, 0.0])
     _, _, ground = estimator._measured(replace(recording.with_plates(()), markers=markers), initial)
     assert (ground.undeclared == borne).all()
-    assert any("bears the person beyond both feet" in message.text for message in ground.reasons) == borne
+    assert any("bears the person beyond both feet" in message.text for message in ground.notes) == borne
 
 
 @pytest.mark.parametrize(("break_s", "pulls"), [(0.3, 1), (1.5, 2)])

@@ -206,9 +206,9 @@ class Footing:
                 self.loads, np.zeros(len(wrench), dtype=bool), self.may, False, None, (said,), (said,)
             ), wrench
         beyond = beyond_the_feet(initial, recording, self.trial.markers)
-        reasons = [said, *([beyond_in_words(beyond, recording.time)] if beyond.any() else [])]
+        texts = (said, *([beyond_in_words(beyond, recording.time)] if beyond.any() else []))
         loads = self.loads.with_undeclared(beyond)
-        return Ground(loads, beyond, self.may, False, None, (said,), tuple(reasons)), wrench
+        return Ground(loads, beyond, self.may, False, None, texts, texts), wrench
 
     def _by_motion(self, check: PlateCheck) -> tuple[Ground, Array]:
         trial, loads, n = self.trial, self.loads, self.trial.recording.n_frames
