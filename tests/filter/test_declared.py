@@ -276,6 +276,8 @@ def test_a_foots_plate_is_not_taken_for_the_seats() -> None:
         estimator.prepare(at_a_distance(0.8))
     with pytest.raises(RecordingError, match=r"on plate 1, declare it \(--contact seat, hand_right or knee=shank_l\)"):
         dynakin.Estimator(person()).prepare(at_a_distance(0.8))
+    with pytest.raises(RecordingError, match="or the forces are of another trial, or in other axes than the markers"):
+        dynakin.Estimator(person()).prepare(at_a_distance(0.8))
     lying = [replace(plate, force=plate.force[:, [1, 0, 2]]) for plate in (foot, other)]
     with pytest.raises(RecordingError, match="the forces lie along") as refused:  # no plate of its own is in question
         estimator.prepare(recording.with_plates(tuple(lying)))

@@ -14,6 +14,7 @@ import pytest
 
 import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
+from dynakin.arrays import runs
 from dynakin.bindings import _core
 from dynakin.cli.prepared import assumed
 from dynakin.errors import RecordingError
@@ -82,6 +83,36 @@ def test_plates_that_carry_the_person_are_found_to(model: str, motion: str, seed
     assert found is not None and not found.undeclared.any() and not ground.undeclared.any()
     assert np.sqrt(np.nanmean(found.excess**2, axis=0)).max() < 0.02 * WEIGHT
     assert found.load_ratio == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("away_m", "borne"), [(0.0, False), (0.8, True)])
+def test_without_plates_nothing_is_the_feets_alone_where_they_are_not_under_the_person(
+    away_m: float, borne: bool
+) -> None:
+    """The feet had all of who is on hands and toes: L5/S1 was "measured" to 9 N m, and 171 off."""
+    recording = simulate("fullbody", "squat", 11, 12.0).recording
+    estimator = person("fullbody")
+    initial = estimator.start(recording).calibrated
+    feet = [recording.marker_names.index(name) for own in initial.markers_on_feet.values() for name in own]
+    markers = recording.markers.copy()
+    markers[:, feet] += np.array([away_m, 0.0, 0.0])
+    _, _, ground = estimator._measured(replace(recording.with_plates(()), markers=markers), initial)
+    assert (ground.undeclared == borne).all()
+    assert any("bears the person beyond both feet" in message.text for message in ground.notes) == borne
+
+
+@pytest.mark.parametrize(("break_s", "pulls"), [(0.3, 1), (1.5, 2)])
+def test_a_short_break_in_what_pulls_is_none(break_s: float, pulls: int) -> None:
+    """Of a stroller that was pushed arms were measured in breaks of 0.1 s: elbows 4 N m off, said to 0.9."""
+    recording = simulate("sagittal7", "squat", 11, 12.0).recording
+    estimator = person("sagittal7")
+    initial = estimator.start(recording).calibrated
+    markers, wrench, _ = estimator._measured(recording, initial)
+    time = recording.time - recording.time[0]
+    pulled = (time > 3.0) & (time < 7.0) & ~((time > 5.0) & (time < 5.0 + break_s))
+    more = wrench + np.outer(pulled, [0.1 * WEIGHT, 0.0, 0.0, 0.0, 0.0, 0.0])
+    found = closure(initial, recording.time, markers, more, np.ones(len(wrench), dtype=bool))
+    assert found is not None and len(runs(found.undeclared)) == pulls
 
 
 @pytest.mark.parametrize("seed", [11, 12])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.model.calibration.body import find_height
+from dynakin.model.calibration.body import check_body_mass, find_height
 from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.definition import load_model
 from dynakin.model.markers.marker_set import load_marker_set
@@ -199,6 +199,13 @@ def test_a_height_is_taken_from_one_frame_with_a_foot_on_the_ground() -> None:
     ground = find_ground_frame(recording, vertical="+Y", forward="+X")
     height, _ = find_height(Subject(), [recording], MarkedTrial.of(recording, match, ground))
     assert height == pytest.approx((places["R_Shoulder"][1] - lowest) / 0.818, abs=1e-9)
+
+
+def test_a_mass_that_is_none_of_that_height_names_the_unit_that_would_explain_it() -> None:
+    with pytest.raises(ModelError, match=r"14.0 kg by plates .*\(--mass\), or .* pounds of force they would be 62"):
+        check_body_mass(Subject(height_m=1.70), 14.0, 1.70)
+    with pytest.raises(ModelError, match=r"expected mass_kg of the subject \(--mass\)$"):
+        check_body_mass(Subject(height_m=1.70), 2.5, 1.70)
 
 
 def test_a_height_that_is_none_of_that_mass_is_refused(standing_person: Recording) -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import FacingPairs, find_marker
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
 from support.made_recordings import plain, standing, without
 
@@ -99,6 +100,54 @@ def test_a_given_vertical_that_body_and_plates_contradict_is_refused() -> None:
     with pytest.raises(RecordingError, match=r"vertical is \+Z, but the body above .* force show \+Y; expected \+Y"):
         find_ground_frame(still, vertical="Z", forward="+X")
     assert find_ground_frame(still, vertical="Y", forward="+X").vertical == "+Y"
+
+
+def lying(*, plates: bool = True, at: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> Recording:
+    """The standing person on the back, 8 cm above the same floor, with the feet towards -X: the body is along +X. The
+    plates bear all of it from below."""
+    still = standing()
+    upright = still.markers
+    markers = np.stack([upright[..., 1], 0.10 + 0.1 * upright[..., 0], -upright[..., 2]], axis=-1) + np.array(at)
+    cop = markers.mean(axis=(0, 1)) * [1.0, 0.0, 1.0]
+    borne = tuple(replace(plate, cop=np.tile(cop, (still.n_frames, 1))) for plate in still.plates)
+    return replace(still, name="lying", markers=markers, plates=borne if plates else ())
+
+
+def test_plates_that_bear_a_person_who_lies_show_up() -> None:
+    """The body's own axis was taken for up, and right forces were to be given "in the axes of the markers"."""
+    found = find_ground_frame(lying(), forward="-X")
+    assert found.vertical == "+Y"
+    assert "the body above the feet says +X, not +Y; not followed" in " ".join(found.how)
+
+
+def test_forces_in_other_axes_than_the_markers_do_not_move_the_vertical() -> None:
+    """Nor does a hand on a wall with a plate: neither presses at the lowest part, under the middle of the markers."""
+    still = standing()
+    order = [0, 2, 1]
+    swapped = [replace(p, force=p.force[:, order], cop=p.cop[:, order]) for p in still.plates]
+    assert find_ground_frame(replace(still, plates=tuple(swapped))).vertical == "+Y"
+    wall = replace(still.plates[0], force=np.tile([-400.0, 0.0, 0.0], (still.n_frames, 1)))
+    wall = replace(wall, cop=np.tile([0.25, 1.3, 0.0], (still.n_frames, 1)))
+    assert find_ground_frame(replace(still, plates=(wall,))).vertical == "+Y"
+
+
+def test_a_standing_trial_over_the_same_floor_shows_up_for_who_lies() -> None:
+    static = standing()
+    found = find_ground_frame(lying(plates=False), forward="-X", static=static)
+    assert found.vertical == "+Y"
+    assert "Vertical +Y: the standing trial" in found.how[0]
+    assert find_ground_frame(lying(plates=False), forward="+Y").vertical == "+X"  # nothing says otherwise
+
+
+def test_a_standing_trial_in_other_axes_leaves_an_upright_person_upright() -> None:
+    """Where its floor shows nothing, the vertical is asked for."""
+    other = standing(rotation_LG=AXES["+Z"], origin_L=(0.0, 0.0, 0.02))
+    upright = replace(standing(origin_L=(0.0, 0.0, 0.9)), plates=())
+    assert find_ground_frame(upright, static=other).vertical == "+Y"
+    on_a_bed = lying(plates=False, at=(1.0, 0.8, 0.0))
+    with pytest.raises(RecordingError, match=r"shows \+X .* standing \+Y: .*--vertical"):
+        find_ground_frame(on_a_bed, forward="-X", static=standing())
+    assert find_ground_frame(on_a_bed, vertical="+Y", forward="-X", static=standing()).vertical == "+Y"
 
 
 def test_forward_without_feet_from_pelvis_and_without_both_from_walking() -> None:

@@ -155,6 +155,15 @@ def test_forces_in_other_axes_than_the_markers_are_named(rows: list[int], axis: 
     found = check(made.with_plates(plates))
     assert found.refusal is not None
     assert re.search(rf"the forces lie along {axis} \(6[0-9]+ N .*, vertical is \+Y: give the forces in", found.refusal)
+    assert re.search(rf"of a person who lies, give the vertical \(--vertical {axis}\)", found.refusal)
+
+
+def test_a_heel_on_a_plate_of_who_is_taken_for_upright_names_the_vertical() -> None:
+    """Of who lies, with the feet on a plate, the body's own axis was up: "the plates carry nobody"."""
+    made = standing(70.0)
+    light = [replace(plate, force=np.tile([60.0, 2.0, 0.0], (made.n_frames, 1))) for plate in made.plates]
+    said = " ".join(map(str, check(made.with_plates(tuple(light))).messages))
+    assert "carry nobody" in said and "pushed along +X (120 N on average)" in said and "--vertical +X" in said
 
 
 def test_a_declared_contacts_plate_may_be_pushed_across_the_vertical() -> None:

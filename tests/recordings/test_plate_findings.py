@@ -284,3 +284,16 @@ def test_what_a_plate_without_numbers_bears_of_a_foot_is_not_known(share: float)
     heavy = gone[full.plates[[p.name for p in full.plates].index("p1")].force[gone, 1] > 50.0]
     assert len(heavy) > 10 and np.isnan(plate.force[heavy]).all()
     assert not loads.total_known[heavy].any() and np.isnan(loads.wrench[heavy, 1]).all()
+
+
+@pytest.mark.parametrize(("height_m", "taken_off"), [(0.05, False), (0.5, True)])
+def test_a_steady_hand_on_a_plate_is_no_zero_of_it(height_m: float, taken_off: bool) -> None:
+    """Of all fours with the hands on plates 90 N were taken off, and L5/S1 was 88 N m off, said to 9."""
+    made = walked().recording
+    idle = with_read(made, "p0", np.full(made.n_frames, 60.0), alone=True)
+    plate = next(plate for plate in idle.plates if plate.name == "p0")
+    hand = np.nanmean(plate.cop, axis=0) + np.array([0.1, height_m, 0.05])
+    markers = np.concatenate([idle.markers, np.tile(hand, (made.n_frames, 1, 1))], axis=1)
+    found, said = zeroed(replace(idle, marker_names=(*idle.marker_names, "RFIN"), markers=markers))
+    assert bool(said) == taken_off
+    assert (np.abs(next(plate.force for plate in found.plates if plate.name == "p0")).max() < 1.0) == taken_off

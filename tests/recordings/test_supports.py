@@ -178,6 +178,19 @@ def test_a_foot_that_is_held_beside_the_other_one_is_not_on_its_plate() -> None:
     assert (loads.reason[:, 1] == MEASURED).all()
 
 
+@pytest.mark.parametrize("sways_m", [0.0, 0.02])
+def test_a_foot_that_never_comes_down_is_held_where_it_sways(sways_m: float) -> None:
+    """By the other foot's markers its own are 7 cm up, beside it; of who stands on one leg for 20 s every moment was a
+    prior. One that keeps its place is on something."""
+    made = steps(4.0, ON_ONE_LEG, TWO_PLATES)
+    sway = sways_m * np.sin(3.0 * made.recording.time)[:, None] * [1.0, 0.5, 1.0]
+    recording = moved(made, "right", sway + np.array([0.0, 0.07 + sways_m, -0.02])).recording.window(1.5, 4.0)
+    loads = foot_loads(recording, LABORATORY, FOOT_MARKERS)
+    held = bool(sways_m)
+    assert (loads.reason[:, 0] == SWING).all() == held
+    assert (loads.reason[:, 1] == MEASURED).all() == held
+
+
 @pytest.mark.parametrize("about", [-0.09, 0.02])
 def test_a_foot_that_turns_about_its_heel_or_its_ball_stands(about: float) -> None:
     made = turning(steps(4.0, ON_ONE_LEG, TWO_PLATES), about)

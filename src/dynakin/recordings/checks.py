@@ -11,8 +11,9 @@ import numpy as np
 
 from dynakin.messages import Findings, Message, note, warning
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.contact import COP_REFUSED_M, NEAR_M, foot_places
+from dynakin.recordings.feet.contact import COP_REFUSED_M, NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.feet.places import foot_places
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import SHOE_M
@@ -166,7 +167,7 @@ def _lying(plates: Sequence[Plate], ground: GroundFrame) -> str | None:
     axis = f"{'+' if mean[k] > 0.0 else '-'}{'XYZ'[k]}"
     return (
         f"the forces lie along {axis} ({along:.0f} N on average while loaded), vertical is {ground.vertical}: "
-        "give the forces in the axes of the markers"
+        f"give the forces in the axes of the markers; of a person who lies, give the vertical (--vertical {axis})"
     )
 
 
@@ -198,11 +199,23 @@ def _idle(
         )
     unit = likely_unit(while_loaded(np.sum(pushes, axis=0)), steps_kg)
     perhaps = f", and whether they are in {unit}, not N" if unit else ""
+    axis, along = _mean_force(recording.plates)
+    lies = (
+        f" They are pushed along {axis} ({along:.0f} N on average), the vertical is {ground.vertical}: of a person who "
+        f"lies, or is on hands and feet, give the vertical (--vertical {axis})."
+    )
     return warning(
         "plates",
         f"the plates carry nobody in this recording (they read {most:.1f} N at most): {without}. If somebody steps on "
-        f"them, look whether their channels were connected{perhaps}.",
+        f"them, look whether their channels were connected{perhaps}.{lies if along > JUDGED_N else ''}",
     )
+
+
+def _mean_force(plates: Sequence[Plate]) -> tuple[str, float]:
+    """Of all plates together: the laboratory axis that it is nearest to, and how much it is along that, N."""
+    mean = np.mean(np.nan_to_num(np.sum([plate.force for plate in plates], axis=0)), axis=0)
+    k = int(np.argmax(np.abs(mean)))
+    return f"{'+' if mean[k] > 0.0 else '-'}{'XYZ'[k]}", float(abs(mean[k]))
 
 
 def _beside(plate: Plate, ground: GroundFrame, feet: Mapping[str, Array]) -> bool:

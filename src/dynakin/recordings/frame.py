@@ -13,14 +13,13 @@ from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.orientation import (
     against_forward,
-    against_vertical,
     axis_vector,
     find_forward,
-    find_vertical,
     horizontal,
     refuse_mirrored,
 )
 from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.vertical import against_vertical, find_vertical
 
 UPRIGHT = {
     "+Y": (((1, 0, 0), (0, 1, 0), (0, 0, 1)), ""),
@@ -117,6 +116,7 @@ def find_ground_frame(
     forward: str | Sequence[float] | Array = "auto",
     origin_L: npt.ArrayLike | None = None,
     pairs: FacingPairs = DEFAULT_PAIRS,
+    static: Recording | None = None,
 ) -> GroundFrame:
     """Find up and forward in a recording, or take what is given; the frame has X forward.
 
@@ -125,13 +125,14 @@ def find_ground_frame(
         forward: "auto", a laboratory axis, or a vector (3,); only its horizontal part counts.
         origin_L: (3,) m; the laboratory's own origin where not given.
         pairs: markers that show the facing direction; ``find_marker``'s rules for their spelling.
+        static: the standing trial, which may show up where the person of the recording lies.
 
     Raises:
         RecordingError: not given and not to be found, or the person is seen in a mirror.
         ConfigError: an unknown axis, or a forward direction that is vertical.
     """
     if vertical.casefold() == "auto":
-        axis, how = find_vertical(recording, pairs)
+        axis, how = find_vertical(recording, pairs, static)
         up = axis_vector(axis)
     else:
         up = axis_vector(vertical)
@@ -175,12 +176,13 @@ def find_laboratory_frame(
     vertical: str = "auto",
     forward: str | Sequence[float] | Array = "auto",
     pairs: FacingPairs = DEFAULT_PAIRS,
+    static: Recording | None = None,
 ) -> GroundFrame:
     """The ground frame of a model that is fixed nowhere: the laboratory's own, Y up, about its origin.
 
     Such a model may head anywhere, so that nothing has to be turned back. With ``forward`` given X is forward, as in
     `find_ground_frame`, whose arguments and errors these are.
     """
-    found = find_ground_frame(recording, vertical=vertical, forward=forward, pairs=pairs)
+    found = find_ground_frame(recording, vertical=vertical, forward=forward, pairs=pairs, static=static)
     asked = not isinstance(forward, str) or forward.casefold() != "auto"
     return found if asked else found.upright()

@@ -14,6 +14,8 @@ from dynakin.units import GRAVITY_M_S2, PERSON_MASS_KG
 UNIT_WITHIN = 0.2
 """A mean load is that of a unit to this part of it: strides that are not whole make no more."""
 CONVERT = "The forces are probably in {}: convert them to N in the file"
+FORCE_UNITS_N = {"kg of force": GRAVITY_M_S2, "pounds of force": 4.448222, "kN": 1000.0}
+"""What forces may be in, in N: by definition."""
 STEPPING_S = 0.3
 """How long all feet that stand must be on plates for the load of who steps to be judged."""
 MASS_WARNING = 0.05
@@ -36,8 +38,7 @@ def likely_unit(load: float, mass_kg: float | None = None) -> str:
         kilograms = 1000.0 * load / GRAVITY_M_S2
         units += [("kN", load)] if PERSON_MASS_KG[0] < kilograms < PERSON_MASS_KG[1] else []
     else:
-        newtons = [("kg of force", GRAVITY_M_S2), ("pounds of force", 4.448222), ("kN", 1000.0)]
-        units += [(name, mass_kg * GRAVITY_M_S2 / one) for name, one in newtons]
+        units += [(name, mass_kg * GRAVITY_M_S2 / one) for name, one in FORCE_UNITS_N.items()]
     fits = [name for name, of_one in units if abs(load / of_one - 1.0) < UNIT_WITHIN]
     return " or ".join(fits)
 

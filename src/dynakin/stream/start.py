@@ -21,10 +21,11 @@ from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
-from dynakin.recordings.orientation import axis_vector, find_vertical
+from dynakin.recordings.orientation import axis_vector
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.standing import standing_window
+from dynakin.recordings.vertical import find_vertical
 from dynakin.results.naming import listed
 from dynakin.stream.fusion import Fused
 

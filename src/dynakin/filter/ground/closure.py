@@ -124,6 +124,7 @@ def closure(
     large, edge, lasting = np.array([EXCESS, EDGE, LASTING]) + UNSEEN * initial.unseen_kg / initial.weighed_kg
     undeclared = _with_edges(judged & (size > large), size > edge, judged, claimed, rate)
     undeclared |= _small_but_lasting(excess / weight, judged & ~undeclared, round(LASTING_S * rate), lasting)
+    undeclared |= _too_short_to_tell(undeclared, round(0.5 * LASTING_S * rate)) & claimed
     for first, end in runs(claimed & ~judged):
         load = float(np.median(wrench[first:end, 1]))
         if end - first > _UNSEEN_S * rate and abs(load - weight) > EXCESS * weight:
@@ -201,6 +202,15 @@ def _small_but_lasting(excess: Array, judged: Flags, window: int, least: float) 
             large = whole & (sign * means[:, axis] > least)
             found |= widened(large, window // 2) & (sign * filled[:, axis] > 0.5 * least)
     return found
+
+
+def _too_short_to_tell(found: Flags, window: int) -> Flags:
+    """Shorter breaks (T,) between two stretches: a mean over twice as long, of which it needs one half, does not show
+    that nothing is missing there."""
+    breaks = np.zeros_like(found)
+    for first, end in runs(~found):
+        breaks[first:end] = first > 0 and end < len(found) and end - first < window
+    return breaks
 
 
 def _with_edges(core: Flags, some: Flags, judged: Flags, claimed: Flags, rate: float) -> Flags:

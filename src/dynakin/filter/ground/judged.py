@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.axes import turned_axes
+from dynakin.filter.ground.beyond_feet import beyond_in_words, beyond_the_feet
 from dynakin.filter.ground.carried import (
     carried_in_hands,
     carried_in_words,
@@ -210,8 +211,15 @@ class Footing:
             "how they divide it is assumed; inertial parameters stay as the table has them."
         )
         said, wrench = note("plates", text), self.trial.wrench
-        nowhere = np.zeros(len(wrench), dtype=bool)
-        return Ground(self.loads, nowhere, self.may, False, None, (said,), (said,)), wrench
+        initial, recording = self.trial.initial, self.trial.recording
+        if self.loads is None or initial.contacts:
+            return Ground(
+                self.loads, np.zeros(len(wrench), dtype=bool), self.may, False, None, (said,), (said,)
+            ), wrench
+        beyond = beyond_the_feet(initial, recording, self.trial.markers)
+        texts = (said, *([beyond_in_words(beyond, recording.time)] if beyond.any() else []))
+        loads = self.loads.with_undeclared(beyond)
+        return Ground(loads, beyond, self.may, False, None, texts, texts), wrench
 
     def _by_motion(self, check: PlateCheck) -> tuple[Ground, Array]:
         trial, loads, n = self.trial, self.loads, self.trial.recording.n_frames
@@ -371,7 +379,8 @@ def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str |
     if not initial.contacts:
         return (
             f". If a chair, a hand or a knee is on {plate}, declare it (--contact seat, hand_right or knee=shank_l), "
-            "else correct the plate's place or its unit"
+            "else the plate's place or its unit is wrong, or the forces are of another trial, or in other axes than "
+            "the markers (turned about the vertical, say)"
         )
     if not names:
         return ""

@@ -22,7 +22,7 @@ from dynakin.recordings.feet.zero_offset import without_offsets
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.weight import CONVERT, likely_unit, while_loaded
+from dynakin.recordings.weight import CONVERT, FORCE_UNITS_N, likely_unit, while_loaded
 from dynakin.settings.subject import Subject
 from dynakin.units import GRAVITY_M_S2
 
@@ -201,6 +201,11 @@ def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) ->
             )
         unit = likely_unit(mass_kg * GRAVITY_M_S2)
         action = f". {CONVERT.format(unit)}" if unit else "; expected mass_kg of the subject (--mass)"
+        perhaps = min(FORCE_UNITS_N, key=lambda name: abs(np.log(index * FORCE_UNITS_N[name] / MEAN_BODY_MASS_INDEX)))
+        if not unit and low <= index * FORCE_UNITS_N[perhaps] <= high:
+            action += (
+                f", or the plates' forces in N: in {perhaps} they would be {mass_kg * FORCE_UNITS_N[perhaps]:.0f} kg"
+            )
         raise ModelError(
             f"mass_kg is not given, and {mass_kg:.1f} kg by plates or file is no mass of a person of {height_m:.2f} m "
             f"({index:.0f} kg/m2, expected {low:g} to {high:g}){action}",

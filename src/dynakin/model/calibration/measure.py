@@ -49,9 +49,10 @@ from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
 from dynakin.recordings.companions import another_person
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
-from dynakin.recordings.orientation import against_vertical, axis_vector, walks
+from dynakin.recordings.orientation import axis_vector, walks
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import MIN_STILL_S, standing_window
+from dynakin.recordings.vertical import against_vertical
 from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
@@ -82,7 +83,9 @@ class Asked:
     def find_ground(self, recording: Recording, match: MarkerMatch) -> GroundFrame:
         """Of one of the recordings."""
         find = find_laboratory_frame if self.model.floating else find_ground_frame
-        return find(recording, vertical=self.vertical, forward=self.forward, pairs=match.facing_pairs)
+        return find(
+            recording, vertical=self.vertical, forward=self.forward, pairs=match.facing_pairs, static=self.static
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -124,7 +124,7 @@ class OpenSimDefinition:
         feet, found_by = feet_of(source, {str(side): body for side, body in options.feet.items()})
         on_feet = foot_markers(source, chosen, feet)
         pairs = facing_pairs(source, chosen, feet)
-        frame = ground or find(recording, vertical=vertical, forward=forward, pairs=pairs)
+        frame = ground or find(recording, vertical=vertical, forward=forward, pairs=pairs, static=static)
         messages += [note("ground", text) for text in frame.how]
         if options.scale_masses:
             source = of_subject(

@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs, widened
 from dynakin.recordings.feet.belt import belt_velocities
+from dynakin.recordings.feet.places import filled_by_others, flat_heights, foot_places
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.landmarks import find_marker
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, SHOE_M, UNDER_MARKERS_M, GroundPlate, floor_height
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.standing import marker_velocities
@@ -126,7 +126,8 @@ def foot_contacts(
     body = middle_velocity(velocity)
     floor = floor_height(recording, ground)
     seen = foot_places(recording, ground, markers)
-    flats = [np.nanpercentile(places[:, :, 1], 5.0, axis=0) for _, places in seen.values()]  # (K,) m, standing flat
+    weighed = any(plate.loaded.any() for plate in plates)  # without them a foot may stand on a step all the time
+    flats = flat_heights([places for _, places in seen.values()], NEAR_SUPPORT_M, ALOFT_M if weighed else np.inf)
     with np.errstate(invalid="ignore"):
         low = [
             (velocity[:, columns], places[:, :, 1] - flat < NEAR_SUPPORT_M)
@@ -139,20 +140,6 @@ def foot_contacts(
     }
     _settle(list(feet.values()))
     return {name: foot.contact() for name, foot in feet.items()}
-
-
-def foot_places(
-    recording: Recording, ground: GroundFrame, markers: Mapping[str, Sequence[str]]
-) -> dict[str, tuple[list[int], Array]]:
-    """The columns of each foot's markers and their places (T, K, 3) m, ground frame; of feet of which one is seen."""
-    found = {}
-    for foot, names in markers.items():
-        own = dict.fromkeys(marker for name in names if (marker := find_marker(recording, name)))
-        columns = [recording.marker_names.index(name) for name in own]
-        columns = [k for k in columns if np.isfinite(recording.markers[:, k]).all(axis=1).any()]
-        if columns:
-            found[foot] = (columns, ground.points_to_ground(recording.markers[:, columns]))
-    return found
 
 
 def pivots(places: Array, velocity: Array) -> Flags:
@@ -354,27 +341,6 @@ class _Foot:
     def _on(lowest_m: float, surface_m: float) -> bool:
         """Whether a foot whose lowest marker is so high may stand on a surface."""
         return -UNDER_MARKERS_M < lowest_m - surface_m < SHOE_M
-
-
-def filled_by_others(points: Array) -> Array:
-    """Points (T, K, D) of one body, a missing one as far from those that are seen as before and after; NaN where none
-    is seen."""
-    seen = np.asarray(np.isfinite(points).all(axis=2))
-    if seen.all() or not seen.any():
-        return points
-    found, frames = points.copy(), np.arange(len(points))
-    for m in range(points.shape[1]):
-        guesses = np.full_like(points, np.nan)
-        for other in range(points.shape[1]):
-            both = seen[:, m] & seen[:, other]
-            if other != m and both.any():
-                offset = points[both, m] - points[both, other]
-                drawn = [np.interp(frames, frames[both], offset[:, c]) for c in range(points.shape[2])]
-                guesses[:, other] = points[:, other] + np.stack(drawn, axis=1)
-        count = np.isfinite(guesses).all(axis=2).sum(axis=1)
-        fill = ~seen[:, m] & (count > 0)
-        found[fill, m] = np.nansum(guesses[fill], axis=1) / count[fill, None]
-    return found
 
 
 def _around(flags: Flags, frames: slice) -> slice:

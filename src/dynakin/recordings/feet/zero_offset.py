@@ -1,8 +1,8 @@
 """What a plate reads while nobody is on it: its zero offset, which is no load of the person's.
 
-It is taken off where the feet show that nobody is on the plate and what it reads stays the same, or drifts: by what it
-reads there, and on straight lines in between. Nothing else then takes it for a load, and no other plate is blamed for
-it.
+It is taken off where the markers show that nobody is on the plate and what it reads stays the same, or drifts: by what
+it reads there, and on straight lines in between. Nothing else then takes it for a load, and no other plate is blamed
+for it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import mean_seen, runs
 from dynakin.messages import Message, note, warning
-from dynakin.recordings.feet.contact import filled_by_others, foot_places
+from dynakin.recordings.feet.places import filled_by_others, foot_places
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.orientation import axis_vector
@@ -33,6 +33,9 @@ NOISE_N = 3.0
 """The noise of the usual plates: what reads less is at zero."""
 CLEAR_S, CLEAR_M = 0.5, 0.3
 """How long no foot must be near a plate, and how far (its middle) is surely not on it: its own length."""
+PRESSED_M = 0.2
+"""How high over a plate a marker of what presses it may be, within `CLEAR_M` of where it presses: of a hand, a forearm,
+a knee on the floor 0.02 to 0.12."""
 BLOCK_S, STEADY_N = 0.25, 5.0
 """What a plate reads by itself varies within so long by less (standard deviation): drifts of 40 N in 3 s do by 1 N,
 noise by 3 N, a cane by 15 N (chosen on walks of `truth3d` of seeds 1 and 61, judged on 3 and 4)."""
@@ -70,11 +73,14 @@ def without_offsets(
     if len(places) < len(foot_markers) or recording.n_frames < 2:
         return recording, []
     feet = [mean_seen(filled_by_others(points)[:, :, [0, 2]], axis=1) for _, points in places.values()]
+    on_feet = {column for columns, _ in places.values() for column in columns}
+    rest = [k for k in range(len(recording.marker_names)) if k not in on_feet]
+    others = ground.points_to_ground(recording.markers[:, rest])
     plates, found = list(recording.plates), list[_Offset]()
     on_ground = [GroundPlate.of(plate, ground) for plate in plates]
     most = np.max(np.sum([plate.push for plate in on_ground], axis=0), initial=0.0)
     for p, plate in enumerate(plates):
-        clear = _clear(on_ground[p], feet, NOBODYS * float(most))
+        clear = _clear(on_ground[p], feet, NOBODYS * float(most)) & ~_pressed(on_ground[p], others)
         offset = _offset_of(on_ground[p], plate.wrench, clear, recording)
         if offset is None:
             continue
@@ -144,6 +150,15 @@ def _clear(plate: GroundPlate, feet: Sequence[Array], nobodys_n: float) -> Flags
         away = distance_to_hull(middle, np.broadcast_to(place, (len(middle), *place.shape)))
         clear &= np.nan_to_num(away, nan=0.0) > CLEAR_M
     return clear
+
+
+def _pressed(plate: GroundPlate, others: Array) -> Flags:
+    """(T,) frames in which a marker (T, M, 3) m that is on no foot is low over where the plate presses: that is a
+    hand's load, or a knee's."""
+    with np.errstate(invalid="ignore"):
+        beside = np.linalg.norm(others[:, :, [0, 2]] - plate.cop[:, None], axis=2) < CLEAR_M
+        low = others[:, :, 1] - (plate.height_m or 0.0) < PRESSED_M
+    return np.asarray((beside & low).any(axis=1))
 
 
 def _taken_in_words(taken: Sequence[_Offset]) -> Message:

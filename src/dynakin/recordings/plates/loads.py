@@ -9,9 +9,10 @@ import numpy as np
 from dynakin.errors import RecordingError
 from dynakin.messages import note
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
-from dynakin.recordings.orientation import axis_vector, find_vertical
+from dynakin.recordings.orientation import axis_vector
 from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, centre_of_pressure
 from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.vertical import find_vertical
 from dynakin.settings.subject import PlateLoad
 
 

@@ -30,9 +30,10 @@ from dynakin.model.markers.draft.guess import Guess, contents, is_text, names_in
 from dynakin.model.markers.match import MarkerMatch, is_unlabelled
 from dynakin.recordings.frame import UPRIGHT
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, plain_name
-from dynakin.recordings.orientation import find_forward, find_vertical
+from dynakin.recordings.orientation import find_forward
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.standing import standing_window
+from dynakin.recordings.vertical import find_vertical
 
 GUESSED = "guessed"
 """Name of the marker set of places that a recording's markers probably have."""
