@@ -103,7 +103,7 @@ HEAVY_CENTRE, HEAVY_SKIN = 3.0, 2.0
 with 25 kg more on the trunk and twice the skin (`docs/validation/deviations.md`)."""
 ONE_SIDED = 0.010 / LANDMARKS.hinge_centre
 """Times as far off as others is the centre of a knee or ankle with a lateral marker alone and no width that somebody
-measured (`docs/validation/geometry.md`)."""
+measured (`docs/validation/geometry.md`), or whose markers sit otherwise in the standing trial."""
 OF_HIPS: dict[Hips, dict[str, float]] = {
     "measured": {},
     "supposed": {"thigh": 3.0},
@@ -151,6 +151,6 @@ def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:
     of_hips = {f"{part}{side}": times for side in SUFFIXES.values() for part, times in OF_HIPS[calibrated.hips].items()}
     if calibrated.unmarked_joints:  # all are said to be as unsure
         return of_hips
-    turns = angles_of(calibrated.one_sided_joints)
+    turns = angles_of((*calibrated.one_sided_joints, *calibrated.moved_joints))
     one_sided = {s.name: ONE_SIDED for s in calibrated.spec.segments if turns & {axis.coordinate for axis in s.axes}}
     return of_hips | one_sided

@@ -248,6 +248,7 @@ class ModelDefinition:
             guessed_places=bool(rest.trial.match.guessed),
             unmarked_joints=rest.unmarked_joints,
             one_sided_joints=rest.one_sided_joints,
+            moved_joints=rest.moved_joints,
             hips=rest.hips,
         )
 

@@ -109,8 +109,9 @@ class CalibratedModel(StartingState):
             have them.
         one_sided_joints: knees and ankles with a lateral marker alone: their centres lie half an adult's joint width
             inwards.
-        hips: where their centres come from: markers of the pelvis, some of which are put where two others or the other
-            side have them (supposed), or proportions of an adult.
+        moved_joints: knees and ankles whose markers sit otherwise in the standing trial than in the trial.
+        hips: where their centres come from: markers of the pelvis; supposed, where some of these are put where two
+            others or the other side have them, or sit otherwise in the trial; or proportions of an adult.
         joint_prior: how elements hang together at first; the others are independent.
         coupled: coordinates of an OpenSim model that follow others, and are none of ``spec``.
         in_radians: rotations, of ``coupled`` too, that OpenSim takes from a table in degrees as radians all the same.
@@ -141,6 +142,7 @@ class CalibratedModel(StartingState):
     guessed_places: bool = False
     unmarked_joints: tuple[str, ...] = ()
     one_sided_joints: tuple[str, ...] = ()
+    moved_joints: tuple[str, ...] = ()
     hips: Hips = "measured"
     joint_prior: JointPrior | None = None
     contacts: dict[str, str] = field(default_factory=dict)

@@ -38,6 +38,7 @@ from dynakin.model.calibration.legs_in_motion import (
     unmarked_legs,
 )
 from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
+from dynakin.model.calibration.moved_markers import Moved, moved_markers
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.calibration.unseen_pelvis import Pelvis, hips_of_proportions
@@ -101,6 +102,7 @@ class Measured:
     held: dict[str, str]  # coordinate -> why nothing shows it
     unmarked_joints: tuple[str, ...]  # knees and ankles that no marker shows
     one_sided_joints: tuple[str, ...]  # those with a lateral marker alone and no measured width
+    moved_joints: tuple[str, ...]  # knees and ankles whose markers sit otherwise in the standing trial
     hips: Hips  # where their centres come from
     still: bool  # the person stands still in the calibration frames
 
@@ -113,6 +115,7 @@ class _Trials:
     trial: MarkedTrial  # of a floating model with X forward: what is measured on landmarks takes it for that
     pelvis: Pelvis
     side: str
+    moved: Moved
 
     @property
     def source(self) -> MarkedTrial:
@@ -217,7 +220,8 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
         held={name: f"segment {segment} has no markers" for segment, names in marked.bare.items() for name in names},
         unmarked_joints=unmarked,
         one_sided_joints=tuple(n for n in LEG_JOINTS if n in finder.usual_widths - {*(asked.functional or ())}),
-        hips=trials.pelvis.hips(finder, found.added, asked.functional or ()),
+        hips=trials.pelvis.hips(finder, found.added, asked.functional or (), trials.moved.hips(finder)),
+        moved_joints=trials.moved.joints(finder),
         still=still.stands,
     )
 
@@ -239,7 +243,7 @@ def _matched(asked: Asked, messages: list[Message]) -> _Trials:
         side, how = choose_side(trial.match, recording, asked.side)
         messages.append(note("calibration", how))
     if static is None:
-        return _Trials(as_asked, trial, Pelvis.of(trial, trial, model), side)
+        return _Trials(as_asked, trial, Pelvis.of(trial, trial, model), side, Moved())
     stands = recognise_standing(static, recording, recognised)
     messages += stands.messages
     source = MarkedTrial.of(static, stands.match, asked.find_ground(static, stands.match))
@@ -247,7 +251,9 @@ def _matched(asked: Asked, messages: list[Message]) -> _Trials:
     messages += lost_on_feet(trial, source) if model.sided else []
     if other := another_person(recording, static):
         messages.append(warning("calibration", f"{other}. Lengths and marker places are those of {static.name}."))
-    return _Trials(as_asked, trial, Pelvis.of(source, trial, model), side)
+    moved = moved_markers(trial, source) if model.sided else Moved()
+    messages += moved.messages
+    return _Trials(as_asked, trial, Pelvis.of(source, trial, model), side, moved)
 
 
 def _marked(asked: Asked, trials: _Trials, messages: list[Message]) -> _Marked:

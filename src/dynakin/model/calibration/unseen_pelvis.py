@@ -104,17 +104,24 @@ class Pelvis:
             ),
         ]
 
-    def hips(self, finder: LandmarkFinder, added: Collection[str], functional: Collection[str]) -> Hips:
+    def hips(
+        self,
+        finder: LandmarkFinder,
+        added: Collection[str],
+        functional: Collection[str],
+        moved: bool = False,
+    ) -> Hips:
         """Where their centres come from, the less sure one.
 
         Args:
-            added: landmarks that were completed. functional: joints that movement shows.
+            added: landmarks that were completed. functional: joints that movement shows. moved: whether markers
+                of the hips sit otherwise in the trial.
         """
         if not _HIPS - {*functional}:
             return "measured"
         if _HIPS & {*added}:
             return "proportions"
-        return "supposed" if finder.markers_of("hip") & self.supposed.keys() else "measured"
+        return "supposed" if moved or finder.markers_of("hip") & self.supposed.keys() else "measured"
 
 
 def hips_of_proportions(added: Collection[str], source: MarkedTrial) -> list[Message]:
