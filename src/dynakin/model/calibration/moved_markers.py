@@ -2,12 +2,12 @@
 
 Markers of one segment keep their distances but for what skin moves. A distance that the standing trial has outside all
 that the trial shows, by more than a part of what skin does there, is not one segment's. It shows only what changes
-distances: a heel marker that is put higher hardly does.
+distances: a heel marker that is put higher hardly does. Skin goes with the bend of hip and knee, so that only frames
+count in which the leg is about as straight as it stands; a trial without such frames shows nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.frames import MarkedTrial
-from dynakin.model.calibration.landmarks import LandmarkFinder
+from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
 from dynakin.model.calibration.legs_in_motion import LEG_JOINTS
 from dynakin.model.markers.fit import LEG, ROOT
 from dynakin.model.markers.match import MarkerKey
@@ -31,15 +31,18 @@ _FAR = 0.45
 segment lies outside. Chosen on the walks and squats of `truth3d` 1, 21 and opencap_subject4 (0.2 at most; with a knee
 marker 20 mm off 0.5 and 0.6), judged on the others and on ten more real pairs: 0.4 at most, but for medial epicondyles
 of `functional`, which lie 16 and 20 mm nearer to, or farther from, the lateral ones in both its trials."""
-_MENDED = 0.2
+_MENDED = 0.35
 """The same, of what may be left after an exchange of two names."""
-_LEAST_M = 0.01
-"""Of the largest of these distances: so exactly a place is found by hand, and a pelvis' skin moves in a deep squat."""
+_LEAST_M = 0.012
+"""Of the largest of these distances: so exactly places are found by hand. 11 mm in a drop jump cut to its landing."""
 _MANY = 3
 """Markers that sit otherwise from which on all are taken to be put on anew: of 30 that are 14 mm off three to five show
 it."""
+_STRAIGHT = 0.98
+"""Of the distance from pelvis to foot while standing, from which on a leg is as straight (a knee bent by 23 deg). Where
+all frames counted, every other squat that was cut to its bottom was accused."""
 _FEWEST = 2  # others on its segment
-_FRAMES = 1000
+_FEWEST_FRAMES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +80,14 @@ def moved_markers(trial: MarkedTrial, source: MarkedTrial) -> Moved:
     moved: dict[MarkerKey, float] = {}
     messages: list[Message] = []
     compared = 0
-    for keys in _segments(trial, source):
+    segments = _segments(trial, source)
+    straight = _straight(trial, source, segments)
+    for (_, side), keys in segments.items():
+        frames = straight.get(side, np.zeros(0, dtype=bool))
+        if len(keys) <= _FEWEST or np.count_nonzero(frames) < _FEWEST_FRAMES:
+            continue
         compared += len(keys)
-        here, there = _distances(trial, keys), _distances(source, keys)[1]
+        here, there = _distances(trial, keys, frames), _distances(source, keys)[1]
         soft = np.array([trial.match.marker_set.marker(name).soft_tissue_m(False) for name, _ in keys])
         size = np.hypot(soft[:, None], soft)
         if pair := _exchanged(here, there, size):
@@ -112,22 +120,42 @@ def moved_markers(trial: MarkedTrial, source: MarkedTrial) -> Moved:
     return Moved(frozenset(moved), anew, tuple(messages))
 
 
-def _segments(trial: MarkedTrial, source: MarkedTrial) -> Iterable[list[MarkerKey]]:
-    """The markers of each segment of pelvis and legs, three or more, that both recordings show."""
+def _segments(trial: MarkedTrial, source: MarkedTrial) -> dict[tuple[str, str], list[MarkerKey]]:
+    """The markers of each segment of pelvis ("centre") and legs that both recordings show, by segment and side."""
     found: dict[tuple[str, str], list[MarkerKey]] = {}
     for key in sorted(trial.match.names.keys() & source.match.names.keys()):
         marker = trial.match.marker_set.marker(key[0])
         if marker.measures(planar=False) and marker.segment in (ROOT, *LEG):
-            found.setdefault((marker.segment, "" if marker.segment == ROOT else key[1]), []).append(key)
-    return [keys for keys in found.values() if len(keys) > _FEWEST]
+            found.setdefault((marker.segment, "centre" if marker.segment == ROOT else key[1]), []).append(key)
+    return found
 
 
-def _distances(trial: MarkedTrial, keys: list[MarkerKey]) -> Array:
+def _straight(
+    trial: MarkedTrial, source: MarkedTrial, segments: dict[tuple[str, str], list[MarkerKey]]
+) -> dict[str, npt.NDArray[np.bool_]]:
+    """Side -> (T,) frames of the trial in which its leg is about as straight as it stands; "centre": both are."""
+    found: dict[str, npt.NDArray[np.bool_]] = {}
+    for side in SIDES:
+        ends = segments.get((ROOT, "centre")), segments.get((LEG[-1], side))
+        if ends[0] is not None and ends[1] is not None:
+            here, there = (
+                np.linalg.norm(_middle(each, ends[0]) - _middle(each, ends[1]), axis=1) for each in (trial, source)
+            )
+            found[side] = here >= _STRAIGHT * np.nanmedian(there) if np.isfinite(there).any() else here < 0.0
+    return found | ({"centre": np.all(list(found.values()), axis=0)} if found else {})
+
+
+def _middle(trial: MarkedTrial, keys: list[MarkerKey]) -> Array:
+    """Of some markers (T, 3) m."""
+    return np.asarray(np.mean([trial.paths[key] for key in keys], axis=0))
+
+
+def _distances(trial: MarkedTrial, keys: list[MarkerKey], frames: npt.NDArray[np.bool_] | None = None) -> Array:
     """Lower, median and upper distance (3, K, K) m between markers; NaN of what is not seen together."""
-    every = -(-trial.recording.n_frames // _FRAMES)
     found = np.full((3, len(keys), len(keys)), np.nan)
     for a, b in combinations(range(len(keys)), 2):
-        apart = np.linalg.norm((trial.paths[keys[a]] - trial.paths[keys[b]])[::every], axis=1)
+        apart = np.linalg.norm(trial.paths[keys[a]] - trial.paths[keys[b]], axis=1)
+        apart = apart if frames is None else apart[frames]
         apart = apart[np.isfinite(apart)]
         if len(apart):
             found[:, a, b] = found[:, b, a] = np.quantile(apart, [_USUAL[0], 0.5, _USUAL[1]])
