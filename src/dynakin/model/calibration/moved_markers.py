@@ -30,7 +30,8 @@ _FAR = 0.45
 """Part of the declared size of both markers' soft tissue by which the median distance of a marker to the others of its
 segment lies outside. Chosen on the walks and squats of `truth3d` 1, 21 and opencap_subject4 (0.2 at most; with a knee
 marker 20 mm off 0.5 and 0.6), judged on the others and on ten more real pairs: 0.4 at most, but for medial epicondyles
-of `functional`, which lie 16 and 20 mm nearer to, or farther from, the lateral ones in both its trials."""
+of `functional`, which are 16 to 20 mm farther from the lateral ones in both its trials, and
+L.Knee of rajagopal's static_walk_1, 14 mm from where static_walk_2 and the trial have it."""
 _MENDED = 0.35
 """The same, of what may be left after an exchange of two names."""
 _LEAST_M = 0.012
@@ -109,9 +110,9 @@ def moved_markers(trial: MarkedTrial, source: MarkedTrial) -> Moved:
     if slipped:
         names = listed([trial.match.names[key] for key in sorted(slipped, key=lambda key: -slipped[key])])
         text = (
-            f"of {compared} markers on pelvis and legs {len(slipped)} sit otherwise in {source.recording.name} than in "
-            f"{trial.recording.name} ({names}): distances to others of their segment lie up to "
-            f"{1e3 * max(slipped.values()):.0f} mm outside those of the trial. "
+            f"{len(slipped)} of {compared} markers on pelvis and legs {'sits' if len(slipped) == 1 else 'sit'} "
+            f"otherwise in {source.recording.name} than in {trial.recording.name} ({names}): distances to others of "
+            f"their segment lie up to {1e3 * max(slipped.values()):.0f} mm outside those of the trial. "
             + ("It looks as if all were put on anew" if anew else "They have slipped, or were put on anew")
             + ": joints that hang on them are less sure, as their deviations say. Give a standing trial of the same "
             "session (--static)."
