@@ -118,6 +118,8 @@ def calibrated() -> Any:
     return SimpleNamespace(
         unmarked_joints=(),
         one_sided_joints=(),
+        moved_joints=(),
+        hips="measured",
         heavy=False,
         own_inertia=False,
         spec=model,

@@ -19,7 +19,7 @@ from dynakin.model.calibration.calibrated import (
     starting_state,
 )
 from dynakin.model.calibration.in_space import started
-from dynakin.model.calibration.measure import Asked, measure, told_of_the_static
+from dynakin.model.calibration.measure import Asked, measure
 from dynakin.model.markers.fit import choose_marker_set, lacking
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
@@ -31,6 +31,7 @@ from dynakin.model.plan import ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.spec import to_core
 from dynakin.model.table import BodyTable, load_table
+from dynakin.recordings.companions import told_of_the_static
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
@@ -247,6 +248,8 @@ class ModelDefinition:
             guessed_places=bool(rest.trial.match.guessed),
             unmarked_joints=rest.unmarked_joints,
             one_sided_joints=rest.one_sided_joints,
+            moved_joints=rest.moved_joints,
+            hips=rest.hips,
         )
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
 
@@ -107,6 +108,23 @@ def another_person(trial: Recording, other: Recording) -> str:
         f"distances between markers that move as one differ by {1e3 * apart:.0f} mm from those in {other.name} "
         f"(median; of one person by {1e3 * _SAME_M:.0f} mm at most): another person, or markers put on anew"
     )
+
+
+@contextmanager
+def told_of_the_static(recording: Recording, static: Recording | None) -> Iterator[None]:
+    """A refusal says, too, that the standing trial is of somebody else, where it looks so.
+
+    Raises:
+        DynakinError: as what is done in it does.
+    """
+    try:
+        yield
+    except DynakinError as refusal:
+        other = "" if static is None else another_person(recording, static)
+        if static is None or not other:
+            raise
+        text = f"{refusal.message}. Of the standing trial {static.path or static.name}: {other}"
+        raise refusal.reworded(text) from None
 
 
 def _common(trial: Recording, other: Recording) -> list[tuple[str, str]]:

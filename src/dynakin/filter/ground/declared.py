@@ -15,8 +15,9 @@ from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.in_hands import HANDS
 from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.contact import ALONE_M, foot_places
+from dynakin.recordings.feet.contact import ALONE_M
 from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.feet.places import foot_places
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N

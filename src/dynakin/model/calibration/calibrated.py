@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,7 @@ from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
+Hips = Literal["measured", "supposed", "proportions"]
 
 UNMARKED_SHARE = 0.09
 """Part of the mass that may be unmarked before it counts: head and hands, of which recordings often have no markers."""
@@ -107,6 +109,9 @@ class CalibratedModel(StartingState):
             have them.
         one_sided_joints: knees and ankles with a lateral marker alone: their centres lie half an adult's joint width
             inwards.
+        moved_joints: knees and ankles whose markers sit otherwise in the standing trial than in the trial.
+        hips: where their centres come from: markers of the pelvis; supposed, where some of these are put where two
+            others or the other side have them, or sit otherwise in the trial; or proportions of an adult.
         joint_prior: how elements hang together at first; the others are independent.
         coupled: coordinates of an OpenSim model that follow others, and are none of ``spec``.
         in_radians: rotations, of ``coupled`` too, that OpenSim takes from a table in degrees as radians all the same.
@@ -137,6 +142,8 @@ class CalibratedModel(StartingState):
     guessed_places: bool = False
     unmarked_joints: tuple[str, ...] = ()
     one_sided_joints: tuple[str, ...] = ()
+    moved_joints: tuple[str, ...] = ()
+    hips: Hips = "measured"
     joint_prior: JointPrior | None = None
     contacts: dict[str, str] = field(default_factory=dict)
     coupled: Coupled | None = None

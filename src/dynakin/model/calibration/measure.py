@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.errors import DynakinError, ModelError
+from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.body import check_body_mass, doubtful_height, find_height, find_mass, joint_widths
+from dynakin.model.calibration.calibrated import Hips
 from dynakin.model.calibration.checks import (
     check_masses,
     check_standing,
@@ -38,8 +38,10 @@ from dynakin.model.calibration.legs_in_motion import (
     unmarked_legs,
 )
 from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
+from dynakin.model.calibration.moved_markers import Moved, moved_markers
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
+from dynakin.model.calibration.unseen_pelvis import Pelvis, hips_of_proportions
 from dynakin.model.markers.fit import refuse_unfit
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.recognise import recognise, recognise_standing
@@ -103,6 +105,8 @@ class Measured:
     held: dict[str, str]  # coordinate -> why nothing shows it
     unmarked_joints: tuple[str, ...]  # knees and ankles that no marker shows
     one_sided_joints: tuple[str, ...]  # those with a lateral marker alone and no measured width
+    moved_joints: tuple[str, ...]  # knees and ankles whose markers sit otherwise in the standing trial
+    hips: Hips  # where their centres come from
     still: bool  # the person stands still in the calibration frames
 
 
@@ -112,8 +116,14 @@ class _Trials:
 
     as_asked: MarkedTrial
     trial: MarkedTrial  # of a floating model with X forward: what is measured on landmarks takes it for that
-    source: MarkedTrial  # where lengths and places are measured: the standing trial, or the same
+    pelvis: Pelvis
     side: str
+    moved: Moved
+
+    @property
+    def source(self) -> MarkedTrial:
+        """Where lengths and places are measured: the standing trial, or the same."""
+        return self.pelvis.source
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,23 +147,6 @@ class _Still:
     source: MarkedTrial
     frames: npt.NDArray[np.intp]
     stands: bool
-
-
-@contextmanager
-def told_of_the_static(recording: Recording, static: Recording | None) -> Iterator[None]:
-    """A refusal says, too, that the standing trial is of somebody else, where it looks so.
-
-    Raises:
-        DynakinError: as what is done in it does.
-    """
-    try:
-        yield
-    except DynakinError as refusal:
-        other = "" if static is None else another_person(recording, static)
-        if static is None or not other:
-            raise
-        text = f"{refusal.message}. Of the standing trial {static.path or static.name}: {other}"
-        raise refusal.reworded(text) from None
 
 
 def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
@@ -230,6 +223,8 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
         held={name: f"segment {segment} has no markers" for segment, names in marked.bare.items() for name in names},
         unmarked_joints=unmarked,
         one_sided_joints=tuple(n for n in LEG_JOINTS if n in finder.usual_widths - {*(asked.functional or ())}),
+        hips=trials.pelvis.hips(finder, found.added, asked.functional or (), trials.moved.hips(finder)),
+        moved_joints=trials.moved.joints(finder),
         still=still.stands,
     )
 
@@ -251,7 +246,7 @@ def _matched(asked: Asked, messages: list[Message]) -> _Trials:
         side, how = choose_side(trial.match, recording, asked.side)
         messages.append(note("calibration", how))
     if static is None:
-        return _Trials(as_asked, trial, trial, side)
+        return _Trials(as_asked, trial, Pelvis.of(trial, trial, model), side, Moved())
     stands = recognise_standing(static, recording, recognised)
     messages += stands.messages
     source = MarkedTrial.of(static, stands.match, asked.find_ground(static, stands.match))
@@ -259,7 +254,9 @@ def _matched(asked: Asked, messages: list[Message]) -> _Trials:
     messages += lost_on_feet(trial, source) if model.sided else []
     if other := another_person(recording, static):
         messages.append(warning("calibration", f"{other}. Lengths and marker places are those of {static.name}."))
-    return _Trials(as_asked, trial, source, side)
+    moved = moved_markers(trial, source) if model.sided else Moved()
+    messages += moved.messages
+    return _Trials(as_asked, trial, Pelvis.of(source, trial, model), side, moved)
 
 
 def _marked(asked: Asked, trials: _Trials, messages: list[Message]) -> _Marked:
@@ -271,6 +268,7 @@ def _marked(asked: Asked, trials: _Trials, messages: list[Message]) -> _Marked:
     if model.sided:
         finder, apart = seen_together(model, finder, match, source)
         messages += apart
+    messages += trials.pelvis.said(finder)
     model = as_marked(model, match, finder)
     chosen, left_out = candidates(model, match, trials.side)
     locks, bare, locked = find_locks(model, match, chosen)
@@ -286,16 +284,17 @@ def _marked(asked: Asked, trials: _Trials, messages: list[Message]) -> _Marked:
 
 def _calibration_frames(asked: Asked, trials: _Trials, marked: _Marked, messages: list[Message]) -> _Still:
     """Where the person stands still, or what comes nearest to it."""
-    model, finder, needed, static = marked.model, marked.finder, marked.needed, asked.static
+    model, finder, needed = marked.model, marked.finder, marked.needed
     trial, source = trials.trial, trials.source
     refuse_moving_origin(model, trial, finder)
     wished = needed | table_markers(model, asked.table, finder)
-    if static is None or not model.sided:  # else the trial may lack markers that only the standing person wears
+    same = source is trial
+    if same or not model.sided:  # else the trial may lack markers that only the standing person wears
         frames, which = trial.calibration_frames(needed, wished)
         trial = _at_origin(model, trial, finder, frames)
-    if static is not None:
+    if not same:
         frames, which = source.calibration_frames(needed, wished)
-    source = trial if static is None else _at_origin(model, source, finder, frames)
+    source = trial if same else _at_origin(model, source, finder, frames)
     messages.append(note("details", f"Lengths and marker places: {which}."))
     window = standing_window(source.recording)
     return _Still(trial, source, frames, window is not None and window.start <= frames[0] < window.stop)
@@ -326,6 +325,7 @@ def _landmarks(
         reasons = dict.fromkeys(source.match.left_out.values())
         unknown = not_understood(source.match, str(source.recording.path or "TRIAL"))
         raise error.reworded("; ".join([error.message, *reasons]) + ("." + unknown if unknown else "")) from None
+    messages += hips_of_proportions(found.added, source)
     if still.stands:
         given = asked.subject.height_m or any(each.subject.get("height_m") for each in asked.recordings)
         messages += check_standing(found.landmarks, source.recording.name, None if given else finder.height_m)

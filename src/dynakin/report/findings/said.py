@@ -33,7 +33,8 @@ _KINDS = (
     _Kind(
         "Joint centres",
         ("joints",),
-        "Give a standing trial with markers on knees and ankles (--static), under names that the marker set knows.",
+        "Give a standing trial that shows the markers of pelvis, knees and ankles (--static), under names that the "
+        "marker set knows.",
     ),
     _Kind(
         "Mass",
