@@ -87,24 +87,24 @@ class Sizes:
 
 
 LANDMARKS = Sizes(
-    hinge_centre=0.002,
-    ball_centre=0.002,
-    spine_centre=0.04,
+    hinge_centre=0.0015,
+    ball_centre=0.0015,
+    spine_centre=0.025,
     ball_across=0.005,
     hinge_axes=np.radians(2.8),
     pair_axes=np.radians(4.0),
     ball_axes=np.radians(0.4),
     root=np.radians(1.0),
-    root_tilt=np.radians(6.0),
+    root_tilt=np.radians(4.0),
     roll=0.0065,
     skin=0.085,
-    mass_centre=0.018,
+    mass_centre=0.012,
     limbs=0.6,
     clock=0.002,
     skin_found=0.37,
     placed=np.inf,
     own_speeds=0.13,
-    own_moments=0.03,
+    own_moments=0.02,
     vigorous=33.0,
     own_off_plates=0.14,
 )
@@ -113,7 +113,7 @@ simulated walks and squats of four people and judged on those of four others (do
 UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
 """Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
 (`docs/validation/geometry.md`)."""
-HEAVY_CENTRE, HEAVY_SKIN = 3.0, 2.0
+HEAVY_CENTRE, HEAVY_SKIN = 4.5, 2.0
 """Times as far off are centres of mass, and as much skin follows joints, of somebody who is `heavy`: simulated walks
 with 25 kg more on the trunk and twice the skin (`docs/validation/deviations.md`)."""
 ONE_SIDED = 0.010 / LANDMARKS.hinge_centre
