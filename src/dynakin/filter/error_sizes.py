@@ -176,7 +176,9 @@ def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:
     turns = angles_of((*calibrated.one_sided_joints, *calibrated.moved_joints))
     one_sided = {s.name: ONE_SIDED for s in calibrated.spec.segments if turns & {axis.coordinate for axis in s.axes}}
     found = of_hips | one_sided
-    since = {site.segment: site.since_m for site in calibrated.plan.sites} if calibrated.plan else {}
+    since: dict[str, float] = {}
+    for site in calibrated.plan.sites if calibrated.plan else ():
+        since[site.segment] = max(since.get(site.segment, 0.0), site.since_m)
     for segment in calibrated.spec.segments:
         skin_m = np.hypot(since.get(segment.name, 0.0), since.get(segment.parent, 0.0))
         factor = np.hypot(found.get(segment.name, 1.0), SINCE_CENTRE * skin_m / LANDMARKS.hinge_centre)

@@ -179,8 +179,8 @@ class Tracker:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
         unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
-        refused = self.verdicts[-1] == "refused"
-        sources = self._sources.moments(feet, refused=refused and not unmeasured)[0]
+        plates_refused = self.verdicts[-1] == "refused"
+        sources = self._sources.moments(feet, refused=plates_refused and not unmeasured)[0]
         if not self.calibrated.feet and self.verdicts[-1] != "accepted":
             sources = np.maximum(sources, np.uint8(DERIVED))
         if report.tracking in NO_ESTIMATE:
@@ -189,7 +189,7 @@ class Tracker:
         unseen = self._sources.unseen(self._sight.look(sample.time_s, markers, self.state, refused), 1)[0]
         sources[unseen] = ABSENT
         blind = feet is not None and bool(feet.blind.any())
-        plates_sd = None if feet is None or refused or not feet.by_plates[0] else feet.plates_sd()[0]
+        plates_sd = None if feet is None or plates_refused or not feet.by_plates[0] else feet.plates_sd()[0]
         self._off_plates |= feet is not None and stands_off_plates(feet.contact, len(self.calibrated.feet))
         segments = () if feet is None else feet.segments
         used = self._sight.used

@@ -213,7 +213,7 @@ def _idle(
 
 def _mean_force(plates: Sequence[Plate]) -> tuple[str, float]:
     """Of all plates together: the laboratory axis that it is nearest to, and how much it is along that, N."""
-    mean = np.mean(np.nan_to_num(np.sum([plate.force for plate in plates], axis=0)), axis=0)
+    mean = np.mean(np.sum([np.nan_to_num(plate.force) for plate in plates], axis=0), axis=0)
     k = int(np.argmax(np.abs(mean)))
     return f"{'+' if mean[k] > 0.0 else '-'}{'XYZ'[k]}", float(abs(mean[k]))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from dynakin.arrays import mean_seen
 from dynakin.errors import RecordingError
-from dynakin.recordings.landmarks import FacingPairs, mean_position, present_pairs
+from dynakin.recordings.landmarks import FacingPairs, find_marker, mean_position, present_pairs
 from dynakin.recordings.orientation import AXES, axis_vector, walks
 from dynakin.recordings.recording import Array, Recording
 
@@ -54,7 +54,8 @@ def find_vertical(recording: Recording, pairs: FacingPairs, static: Recording | 
     Witnesses, the first that speaks decides and the others are heard: the body itself (pelvis above heels),
     the plates (they push upwards), the standing trial, the longer side of the markers' box (an axis without its sign),
     what the file says of its screen (can be wrong: it is often left over from another laboratory). The body gives way
-    to plates that bear it from below, and to a standing trial of the same laboratory.
+    to plates that bear it from below, or over the standing trial's floor, and to a standing trial of the same
+    laboratory.
 
     Raises:
         RecordingError: no witness, or a standing trial of which nobody knows whether it is of the same laboratory says
@@ -102,9 +103,16 @@ def _surer_than_the_body(recording: Recording, body: str, standing: _StandingFlo
     """
     plates = _from_plates(recording)
     upright = standing.vertical if standing else body
-    if plates is not None and plates != body and _bear(recording, plates, from_below=plates != upright):
-        return plates
-    if standing is None or body in (upright, plates) or walks(recording, axis_vector(body)):
+    if {plates or body, upright} == {body} or walks(recording, axis_vector(body)):
+        return body
+    if plates is not None and plates != body:
+        if standing is not None and standing.vertical == plates:
+            bear = standing.lies_under(recording, plates) and _bear(recording, plates)
+        else:
+            bear = _bear(recording, plates, from_below=True)
+        if bear:
+            return plates
+    if standing is None or body in (upright, plates):
         return body
     own, other = (standing.lies_under(recording, axis) for axis in (body, upright))
     if own != other:
@@ -116,7 +124,7 @@ def _surer_than_the_body(recording: Recording, body: str, standing: _StandingFlo
     )
 
 
-def _bear(recording: Recording, axis: str, from_below: bool) -> bool:
+def _bear(recording: Recording, axis: str, from_below: bool = False) -> bool:
     """Whether the plates bear the person if this axis is up, and, if asked, do so from below: they press at the
     person's lowest part, under the middle of the markers."""
     up = axis_vector(axis)
@@ -155,8 +163,11 @@ def _name(direction: Array) -> str | None:
 
 def _from_body(recording: Recording, pairs: FacingPairs) -> str | None:
     everything = slice(None)
-    feet = list(pairs.below) or [name for pair in present_pairs(recording, pairs.heel_toe) for name in pair]
-    body = list(pairs.above) or [name for pair in present_pairs(recording, pairs.pelvis) for name in pair]
+    below, above = (
+        [own for name in names if (own := find_marker(recording, name))] for names in (pairs.below, pairs.above)
+    )
+    feet = below or [name for pair in present_pairs(recording, pairs.heel_toe) for name in pair]
+    body = above or [name for pair in present_pairs(recording, pairs.pelvis) for name in pair]
     low, high = (mean_position(recording, names, everything) for names in (feet, body))
     return None if low is None or high is None else _name(high - low)
 
@@ -164,8 +175,7 @@ def _from_body(recording: Recording, pairs: FacingPairs) -> str | None:
 def _from_plates(recording: Recording) -> str | None:
     if not recording.plates:
         return None
-    force = np.sum([plate.force for plate in recording.plates], axis=0)
-    force = force[np.isfinite(force).all(axis=1)]
+    force = np.nan_to_num(np.array([plate.force for plate in recording.plates])).sum(axis=0)  # empty ones may be NaN
     return _name(force.mean(axis=0)) if len(force) and np.abs(force).max() > 50 else None
 
 

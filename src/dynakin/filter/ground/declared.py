@@ -48,8 +48,6 @@ BETWEEN, OFTEN = 0.2, 0.1
 between them, for that part of its load: of hands on plates of their own it is 0.03 to 0.15 of the way (a wrist lies
 behind its palm), of two on one plate 0.45 to 0.55. Chosen on planks and push-ups of one simulated person; hands and
 knees on all fours did not choose."""
-
-
 AT_PLATE = 0.25
 """Ratio of `acts_at` below which something acts at the plates, and above whose inverse at a contact: twice as near."""
 
@@ -211,10 +209,11 @@ def acts_at(found: Closure, frames: Flags, pressed: Array, places: Array, *, mea
 
 def held_in_words(what: str, initial: CalibratedModel, touched: Flags) -> str:
     """That something is laid to some of the declared contacts (C,)."""
-    names = " and the ".join(name for name, own in zip(initial.contacts, touched, strict=True) if own)
+    held = [name for name, own in zip(initial.contacts, touched, strict=True) if own]
+    names = f"{' and the '.join(held)} {'bears' if len(held) == 1 else 'bear'}"
     return (
-        f"{what}: that is taken as what the {names} bears, and the total wrench is not measured there. If nobody holds "
-        "on to anything, do not declare it."
+        f"{what}: that is taken as what the {names}, and the total wrench is not measured there. If nobody holds on to "
+        "anything, do not declare it."
     )
 
 

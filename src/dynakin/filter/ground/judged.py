@@ -328,7 +328,7 @@ class Footing:
             return gains
         off = [GroundPlate.of(plates[p], self.trial.initial.ground) for p in np.flatnonzero(gains.off)]
         during = np.asarray(first.bears.any(axis=1))
-        near = min(acts_at(first.found, during & own.loaded, own.cop, self._places) for own in off)
+        near = max(acts_at(first.found, during & own.loaded, own.cop, self._places) for own in off)
         if near < AT_PLATE:
             return gains
         if near * AT_PLATE < 1.0:  # nobody can tell

@@ -113,7 +113,7 @@ def moved_markers(trial: MarkedTrial, source: MarkedTrial) -> Moved:
             f"{len(slipped)} of {compared} markers on pelvis and legs {'sits' if len(slipped) == 1 else 'sit'} "
             f"otherwise in {source.recording.name} than in {trial.recording.name} ({names}): distances to others of "
             f"their segment lie up to {1e3 * max(slipped.values()):.0f} mm outside those of the trial. "
-            + ("It looks as if all were put on anew" if anew else "They have slipped, or were put on anew")
+            + ("It looks as if all were put on anew" if anew else "A marker has slipped, or was put on anew")
             + ": joints that hang on them are less sure, as their deviations say. Give a standing trial of the same "
             "session (--static)."
         )

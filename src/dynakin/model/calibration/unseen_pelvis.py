@@ -85,14 +85,14 @@ class Pelvis:
                 aliases = source.match.marker_set.marker(key[0]).aliases
                 name, other = aliases(key[1])[0], aliases(_OTHER[key[1]])[0]
                 source = _with(source, key, name, place)
-                supposed[key] = f"nothing shows {name}, which is put opposite {other} by the pelvis' middle plane"
+                supposed[key] = f"nothing shows {name}, so it is put where {other} is on the other side of the pelvis"
         return cls(source, supposed, tuple(messages))
 
     def said(self, finder: LandmarkFinder) -> list[Message]:
         """The notes, and a warning of what hangs on each marker whose place is supposed."""
         hips = finder.markers_of("hip")
-        off = "the angles of pelvis and hips may be 5 deg off by it, always alike"
-        farther = ", and the hips 2 cm, which deviations of moments hold"
+        off = "angles of pelvis and hips may be off by up to 5 deg because of it, in all frames alike"
+        farther = ", and hip centres by 2 cm, which the deviations of moments hold"
         return [
             *self.messages,
             *(

@@ -38,5 +38,5 @@ def without_blanks(
             emptied.append(plate.name)
     if not emptied:
         return recording, []
-    text = f"No numbers while no foot is on it: {', '.join(emptied)}, taken as empty there."
+    text = f"{', '.join(emptied)}: no numbers while no foot is there, taken as empty."
     return recording.with_plates(tuple(plates)), [note("plates", text)]
