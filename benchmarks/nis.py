@@ -26,7 +26,7 @@ from dynakin.settings.noise import JointGroup
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import case_of
 from recordings import DATA, ROOT, TRIALS, Array
-from recordings import Samples as Known
+from recordings import Trial as Known
 
 KEPT = ROOT / "build" / "nis"
 LONGEST_S = 20.0

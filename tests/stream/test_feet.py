@@ -190,7 +190,7 @@ def test_the_total_wrench_is_what_the_feet_give(squat: tuple[Live, list[LiveFram
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_walking_leaves_out_what_offline_leaves_out(seed: int) -> None:
-    """Measured on seeds 1 to 6: live keeps the 5 or 6 frames before a foot lands beside the plates, where the force is
+    """Measured on seeds 1 to 6: live keeps the 6 or 7 frames before a foot lands beside the plates, where the force is
     off by 7 N at most; it leaves out 2 more after a foot has left the floor there, and 4 to 6 where one lands on a
     plate that is not loaded yet."""
     walk = simulate("fullbody", "gait", seed)
@@ -200,7 +200,7 @@ def test_walking_leaves_out_what_offline_leaves_out(seed: int) -> None:
     offline = foot_loads(walk.recording, initial.ground, initial.foot_markers).total_known[begin:]
     now = np.array([f.status.plates == "used" for f in frames])
     assert {f.status.plates for f in frames} == {"used", "incomplete"} and np.count_nonzero(offline) > 100
-    assert np.count_nonzero(now & ~offline) <= 6 and np.count_nonzero(offline & ~now) <= 14
+    assert np.count_nonzero(now & ~offline) <= 7 and np.count_nonzero(offline & ~now) <= 14
     error = walk.recording.total_wrench()[begin:, 1] - walk.truth.data["wrench"].values[begin:, 1]
     assert np.abs(error[now]).max() < 20.0 and np.abs(error[~now]).max() > 500.0
     assert sum("do not carry all of the person" in text for text in said) == 1

@@ -101,7 +101,7 @@ def _contact_in_words(name: str, found: dict[str, Any]) -> str:
     if not found["frames"]:
         return (
             f"The {name}, declared, bears nothing in this recording that shows. Less than {100.0 * STATED:.0f} % of "
-            "the weight all the time would not show (for a hand, the deviations of arms and L5/S1 hold that), nor would "
+            "the weight all the time would not show (of a hand, deviations of arms and L5/S1 hold that), nor would "
             "what it bears on the plate of a foot: give it a plate of its own."
         )
     how = listed([f"{what} in {found[what]}" for what in MEANINGS if found[what]])

@@ -101,7 +101,10 @@ def _tracking(data: xr.Dataset, sought: Flags) -> list[Event]:
     """Stretches in which the filter did not believe its markers, and what it did about them, but for what is found when
     it comes into sight again (T,)."""
     time, tracking = data["time"].values, data["tracking"].values.copy()
-    tracking[sought & (tracking == TRACKING.index("found"))] = TRACKING.index("following")
+    lost = np.isin(tracking, [TRACKING.index(word) for word in ("lost", "doubtful")])
+    for start, end in runs(sought):
+        if not lost[max(start - 1, 0) : end].any():  # else the motion as a whole is found
+            tracking[start:end][tracking[start:end] == TRACKING.index("found")] = TRACKING.index("following")
     kinds: tuple[tuple[str, EventKind, str], ...] = (
         ("doubtful", "gated", "most markers contradict the motion: nothing measured was used"),
         ("lost", "reset", "motion lost and held where it was"),

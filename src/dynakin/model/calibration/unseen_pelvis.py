@@ -120,18 +120,18 @@ class Pelvis:
         if not _HIPS - {*functional}:
             return "measured"
         if _HIPS & {*added}:
-            return "proportions"
+            return "supposed" if _framed(self.source) else "proportions"
         return "supposed" if moved or finder.markers_of("hip") & self.supposed.keys() else "measured"
 
 
 def hips_of_proportions(added: Collection[str], source: MarkedTrial) -> list[Message]:
-    """A warning where hips are not measured at all.
+    """A warning where hips are not measured at all, nor laid into a pelvis that markers show.
 
     Args:
         added: landmarks that were completed.
     """
     hips = [words(name) for name in sorted(_HIPS & {*added})]
-    if not hips:
+    if not hips or _framed(source):
         return []
     names = listed([source.match.names[key] for key in sorted(_on_the_pelvis(source))])
     text = (
@@ -150,6 +150,13 @@ def _on_the_pelvis(trial: MarkedTrial) -> set[MarkerKey]:
     """Its markers that some frame shows."""
     own = {key: path for key, path in trial.paths.items() if _segment(trial, key[0]) == ROOT}
     return {key for key, path in own.items() if np.isfinite(path).all(axis=1).any()}
+
+
+def _framed(source: MarkedTrial) -> bool:
+    """Whether both ASIS and something else show how the pelvis lies, though no regression has all that it needs (a
+    sacral cluster instead of PSIS)."""
+    own, needed = _on_the_pelvis(source), _needed(source)
+    return bool(needed) and needed < own
 
 
 def _needed(source: MarkedTrial) -> set[MarkerKey]:
