@@ -139,6 +139,30 @@ def test_a_standing_trial_over_the_same_floor_shows_up_for_who_lies() -> None:
     assert find_ground_frame(lying(plates=False), forward="+Y").vertical == "+X"  # nothing says otherwise
 
 
+def test_who_is_upright_in_other_axes_than_forces_and_standing_trial_does_not_lie() -> None:
+    """As told by the floor, which is elsewhere along their axis; a squat was run as one who lies, "plate 1 off its
+    place"."""
+    static = standing()
+    turned = standing(rotation_LG=AXES["+Z"], origin_L=(0.0, 0.6, 0.0))
+    assert find_ground_frame(replace(turned, plates=static.plates), static=static).vertical == "+Z"
+
+
+def test_a_standing_trial_may_lack_markers_or_spell_them_otherwise() -> None:
+    """Nothing else of it was asked than the trial's own names, and it was refused."""
+    whole = standing()
+    few = [k for k, name in enumerate(whole.marker_names) if name != "RASI"]
+    names = tuple(f"Somebody:{whole.marker_names[k]}" for k in few)
+    static = replace(whole, marker_names=names, markers=whole.markers[:, few])
+    assert find_ground_frame(lying(plates=False), forward="-X", static=static).vertical == "+Y"
+
+
+def test_plates_without_numbers_while_empty_show_up_as_well() -> None:
+    recording = lying()
+    gone = np.full((recording.n_frames, 3), np.nan)
+    empty = replace(recording.plates[0], name="empty", force=gone, moment=gone, cop=gone)
+    assert find_ground_frame(replace(recording, plates=(*recording.plates, empty)), forward="-X").vertical == "+Y"
+
+
 def test_a_standing_trial_in_other_axes_leaves_an_upright_person_upright() -> None:
     """Where its floor shows nothing, the vertical is asked for."""
     other = standing(rotation_LG=AXES["+Z"], origin_L=(0.0, 0.0, 0.02))
