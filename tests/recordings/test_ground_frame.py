@@ -153,7 +153,8 @@ def test_a_standing_trial_may_lack_markers_or_spell_them_otherwise() -> None:
     few = [k for k, name in enumerate(whole.marker_names) if name != "RASI"]
     names = tuple(f"Somebody:{whole.marker_names[k]}" for k in few)
     static = replace(whole, marker_names=names, markers=whole.markers[:, few])
-    assert find_ground_frame(lying(plates=False), forward="-X", static=static).vertical == "+Y"
+    pairs = FacingPairs((), (), above=("RASI", "LASI"), below=("RHEE", "LHEE"))
+    assert find_ground_frame(lying(plates=False), forward="-X", pairs=pairs, static=static).vertical == "+Y"
 
 
 def test_plates_without_numbers_while_empty_show_up_as_well() -> None:
