@@ -157,14 +157,12 @@ def _lying(plates: Sequence[Plate], ground: GroundFrame) -> str | None:
     the markers. A declared contact may be pushed in any direction (a wall)."""
     if not plates:
         return None
-    total = np.nan_to_num(np.sum([plate.force for plate in plates], axis=0))
+    total = _total_force(plates)
     size = np.linalg.norm(total, axis=1)
     mean = total[size > 0.5 * size.max()].mean(axis=0) if size.max() > LYING_N[0] else np.zeros(3)
-    k = int(np.argmax(np.abs(mean)))
-    along, upwards = abs(mean[k]), abs(ground.vectors_to_ground(mean)[1])
+    (axis, along), upwards = _nearest_axis(mean), abs(ground.vectors_to_ground(mean)[1])
     if not LYING_N[0] < along < LYING_N[1] or upwards > LYING * along:
         return None
-    axis = f"{'+' if mean[k] > 0.0 else '-'}{'XYZ'[k]}"
     return (
         f"the forces lie along {axis} ({along:.0f} N on average while loaded), vertical is {ground.vertical}: "
         f"give the forces in the axes of the markers; of a person who lies, give the vertical (--vertical {axis})"
@@ -199,7 +197,7 @@ def _idle(
         )
     unit = likely_unit(while_loaded(np.sum(pushes, axis=0)), steps_kg)
     perhaps = f", and whether they are in {unit}, not N" if unit else ""
-    axis, along = _mean_force(recording.plates)
+    axis, along = _nearest_axis(_total_force(recording.plates).mean(axis=0))
     lies = (
         f" They are pushed along {axis} ({along:.0f} N on average), the vertical is {ground.vertical}: of a person who "
         f"lies, or is on hands and feet, give the vertical (--vertical {axis})."
@@ -211,11 +209,15 @@ def _idle(
     )
 
 
-def _mean_force(plates: Sequence[Plate]) -> tuple[str, float]:
-    """Of all plates together: the laboratory axis that it is nearest to, and how much it is along that, N."""
-    mean = np.mean(np.sum([np.nan_to_num(plate.force) for plate in plates], axis=0), axis=0)
-    k = int(np.argmax(np.abs(mean)))
-    return f"{'+' if mean[k] > 0.0 else '-'}{'XYZ'[k]}", float(abs(mean[k]))
+def _total_force(plates: Sequence[Plate]) -> Array:
+    """(T, 3) N of all plates; a plate without numbers gives nothing."""
+    return np.asarray(np.sum([np.nan_to_num(plate.force) for plate in plates], axis=0))
+
+
+def _nearest_axis(force: Array) -> tuple[str, float]:
+    """The laboratory axis that a force (3,) N is nearest to, and how much it is along that."""
+    k = int(np.argmax(np.abs(force)))
+    return f"{'+' if force[k] > 0.0 else '-'}{'XYZ'[k]}", float(abs(force[k]))
 
 
 def _beside(plate: Plate, ground: GroundFrame, feet: Mapping[str, Array]) -> bool:

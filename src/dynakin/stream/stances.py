@@ -24,7 +24,8 @@ _BELT_STEP_S, _BELT_EVERY_S = 0.018, 0.5  # a belt is looked for twice a second,
 class LiveStances:
     """Offline (`recordings.feet.contact`) whole stances are seen; here a foot stands where a marker is near its lowest
     place, or keeps a height that something must hold it at, and is slow against the floor, or the belt of the last
-    seconds. Thresholds are the same.
+    seconds. Thresholds are the same; that a foot may bear a moment before it stands, or never comes down, is known
+    offline alone.
 
     Attributes:
         marked: (F,) feet that have markers. time_s: of the moment that was looked at last, and of it:

@@ -11,6 +11,7 @@ from dynakin.arrays import filled
 from dynakin.bindings import _core
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.judged import Ground
+from dynakin.filter.ground.plate_sum import pressed_at
 from dynakin.filter.limbs import unseen_limbs
 from dynakin.messages import Message, about, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -58,7 +59,7 @@ def off_place(
     for k in np.flatnonzero(known & (measured[:, 1] > BEARS * weight)):
         needed = _core.wrench(model, posed[k])
         if needed[1] > BEARS * weight:
-            apart[k] = _pressed(measured[k]) - _pressed(needed)
+            apart[k] = np.subtract(*pressed_at(np.stack([measured[k], needed])))
     bears = np.isfinite(apart).all(axis=1)
     alone = bears & (loads.on.any(axis=1).sum(axis=1) == 1)
     for own in loads.others.values():
@@ -78,11 +79,6 @@ def off_place(
         f"within {limit:.2f} m. Either the plates lie elsewhere than the file says (corners, origin, centres of "
         "pressure), or something else steadies the person.",
     )
-
-
-def _pressed(wrench: Array) -> Array:
-    """(2,) m, X and Z of where a wrench (6,) presses on the ground's plane."""
-    return np.asarray(np.array([wrench[5], -wrench[3]]) / wrench[1])
 
 
 def _apart(apart: Array, rate: float, limit: float) -> tuple[float, float] | None:

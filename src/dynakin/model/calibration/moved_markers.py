@@ -122,7 +122,7 @@ def moved_markers(trial: MarkedTrial, source: MarkedTrial) -> Moved:
 
 
 def _segments(trial: MarkedTrial, source: MarkedTrial) -> dict[tuple[str, str], list[MarkerKey]]:
-    """The markers of each segment of pelvis ("centre") and legs that both recordings show, by segment and side."""
+    """The markers of each segment of pelvis ("centre") and legs that both recordings have, by segment and side."""
     found: dict[tuple[str, str], list[MarkerKey]] = {}
     for key in sorted(trial.match.names.keys() & source.match.names.keys()):
         marker = trial.match.marker_set.marker(key[0])
