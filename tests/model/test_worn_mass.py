@@ -72,6 +72,6 @@ def test_a_foot_may_wear_a_shoe_and_be_as_heavy_as_in_other_models(ahead_m: floa
     sd, body = plan.prior(Priors()), plan.inertia["foot_r"]
     for more_kg in (0.006 * 70.0, 0.021 * 70.0 - body.mass):
         assert more_kg < 1.3 * sd["inertia/foot_r/mass"]
-        assert abs(more_kg * (body.centre[0] + ahead_m)) < 1.5 * sd["inertia/foot_r/mx"]
+        assert abs(more_kg * (body.centre[0] + ahead_m)) < 1.7 * sd["inertia/foot_r/mx"]
     worn = plan.worn_kg(Priors())
     assert {name for name, kg in worn.items() if kg > worn["hand_r"]} == {"foot_r", "foot_l"}

@@ -108,7 +108,7 @@ def test_a_segment_that_nobody_sees_for_long_is_a_finding(estimate: Estimate) ->
 
 def test_a_force_that_no_contact_gives_is_a_finding(estimate: Estimate) -> None:
     metrics = compute_metrics(estimate)
-    heavy = replace(estimate, config=estimate.config | {"mass_kg": 70.0})
-    for newton, expected in ((100.0, False), (300.0, True)):
-        metrics["feet"] = {"left_at_root": {"grounded": {"force_n": newton, "moment_nm": 1.0}, "flight": None}}
-        assert (forces.left(heavy, metrics) is not None) == expected
+    for share, expected in ((0.15, False), (0.4, True)):
+        grounded = {"force_n": 700.0 * share, "moment_nm": 1.0, "share": share}
+        metrics["feet"] = {"left_at_root": {"grounded": grounded, "flight": None}}
+        assert (forces.left(estimate, metrics) is not None) == expected

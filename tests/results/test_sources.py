@@ -36,6 +36,7 @@ from dynakin.results.measures.sources import (
 from dynakin.results.measures.stances import counted, phases
 from dynakin.results.measures.tracking import without_lost
 from dynakin.results.records import REFUSED
+from dynakin.units import GRAVITY_M_S2
 from support.estimates.walking import MASS_KG, STANCE_S, make_walker
 
 PEAK_N = 700.0
@@ -313,6 +314,17 @@ def test_nothing_left_at_the_root_is_said_by_the_numbers_only() -> None:
     data["wrench_remainder"][50, 1] = 718.0
     contradicted = compute_metrics(replace(walker, data=data))["feet"]
     assert contradicted["left_at_root"]["grounded"]["force_n"] == pytest.approx(718.0)
+    weight = GRAVITY_M_S2 * walker.mass_kg
+    landing = walker.data.copy(deep=True)
+    for at in (50, 55):  # a landing of three times the weight, and a moment of once the weight
+        landing["wrench_remainder"][at, 1] = 0.3 * weight
+    landing["foot_wrench"][50, :, :3] = 0.0
+    landing["foot_wrench"][50, 0, 1] = 3.0 * weight
+    landing["foot_wrench"][55, :, :3] = 0.0
+    for share in (0.3, 0.1):
+        left = compute_metrics(replace(walker, data=landing))["feet"]["left_at_root"]
+        assert left["grounded"]["share"] == pytest.approx(share)
+        landing["wrench_remainder"][55, 1] = 0.0
     assert "Nothing is left" not in contradicted["verdict"]
     assert "Up to 718 N and 0 N m of residual are left at the root" in contradicted["verdict"]
     seated = walker.data.copy(deep=True)  # both feet measured, and yet not all that bears the person

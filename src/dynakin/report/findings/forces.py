@@ -8,10 +8,9 @@ from dynakin.report.findings.finding import Insight, Metrics
 from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import listed, number, plural, sentence
-from dynakin.units import GRAVITY_M_S2
 
-# Part of the weight that no contact gives, from which it is said: good recordings leave 0.03 to 0.16 for a frame, one
-# frame that was filled 0.4.
+# Part of what contacts give, of the weight at least, that none of them gives, from which it is said: good recordings
+# leave 0.03 to 0.16 for a frame, one frame that was filled 0.4.
 LEFT = 0.25
 # What to do, in the words of a laboratory.
 ADVICE = {
@@ -61,12 +60,12 @@ def left(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """A force that no contact gives while the feet are on plates: a jump in the motion, as a filled frame makes one."""
     feet = metrics["feet"]
     largest = feet and feet["left_at_root"]["grounded"]
-    weight = GRAVITY_M_S2 * (estimate.mass_kg or 0.0)
-    if not largest or not weight or largest["force_n"] < LEFT * weight:
+    if not largest or largest["share"] < LEFT:
         return None
     text = (
         f"At one time the motion needs {number(largest['force_n'], 'N')} more or less than the feet's plates give "
-        f"({number(100.0 * largest['force_n'] / weight, '%', digits=2)} of the weight)."
+        f"(up to {number(100.0 * largest['share'], '%', digits=2)} of the weight, or of what they give where that is "
+        "more)."
     )
     return Insight("warning", "Left at the pelvis", text, ADVICE["left"], ("sum of the plates",))
 

@@ -39,7 +39,8 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         ``flight_frames``, in which nothing touches the ground; ``derived_frames``, ``prior_frames`` and
         ``unknown_frames``: those in which a foot's wrench is derived, a prior, or not known; ``left_at_root``: the
         largest force (N) and moment about the root (N m) that no contact gives, ``grounded`` where all contacts are
-        measured (each, or the sum of two; not where the plates were refused) and in ``flight``; ``verdict``.
+        measured (each, or the sum of two; not where the plates were refused; there with its largest ``share`` of what
+        they give, or of the weight where that is more) and in ``flight``; ``verdict``.
     """
     if not estimate.foot_names or "foot_wrench" not in estimate.data:
         return None
@@ -58,7 +59,10 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         for k, name in enumerate(estimate.foot_names)
     }
     about_root = wrench_about(remainder, _root(estimate)[window])
-    left = {"grounded": _largest(about_root[grounded]), "flight": _largest(about_root[flight])}
+    weight = GRAVITY_M_S2 * (estimate.mass_kg or 0.0)
+    borne = np.linalg.norm(estimate.values("foot_wrench")[window, :, :3].sum(axis=1), axis=1)
+    least = np.fmax(borne, weight or np.nan)
+    left = {"grounded": _largest(about_root[grounded], least[grounded]), "flight": _largest(about_root[flight])}
     figures = {
         "adjustment_rms": adjustment,
         "remainder_rms": _rms(COMPONENTS, remainder[flight]) if flight.any() else None,
@@ -68,7 +72,6 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         "unknown_frames": int((codes == sources.ABSENT).any(axis=1).sum()),
         "left_at_root": left,
     }
-    weight = GRAVITY_M_S2 * (estimate.mass_kg or 0.0)
     return figures | {"verdict": _words(figures, int(grounded.sum()), len(contact), FLIGHT * weight)}
 
 
@@ -126,13 +129,15 @@ def _rms(names: Sequence[str], values: np.ndarray) -> dict[str, float]:
     return dict(zip(names, rms(values, axis=0).tolist(), strict=True))
 
 
-def _largest(wrench: np.ndarray) -> dict[str, float] | None:
-    """Of wrenches (N, 6); None where none is known."""
-    known = wrench[np.isfinite(wrench).all(axis=1)]
-    if not len(known):
+def _largest(wrench: np.ndarray, least_n: np.ndarray | None = None) -> dict[str, float] | None:
+    """Of wrenches (N, 6); None where none is known. With what their forces are compared with (N,) the largest share of
+    that, too: a landing of three times the weight is no worse modelled for three times the error."""
+    known = np.isfinite(wrench).all(axis=1)
+    if not known.any():
         return None
-    force, moment = (float(np.linalg.norm(part, axis=1).max()) for part in (known[:, :3], known[:, 3:]))
-    return {"force_n": force, "moment_nm": moment}
+    force, moment = (np.linalg.norm(part, axis=1) for part in (wrench[known, :3], wrench[known, 3:]))
+    found = {"force_n": float(force.max()), "moment_nm": float(moment.max())}
+    return found if least_n is None else found | {"share": float(np.nanmax(force / least_n[known], initial=0.0))}
 
 
 def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float) -> str:
