@@ -16,7 +16,7 @@ Flags = npt.NDArray[np.bool_]
 Array = npt.NDArray[np.float64]
 
 SKIN_M, SHOWN_RAD = 0.01, np.deg2rad(10.0)
-"""A segment out of sight is known where markers that skin moves by so much show its joint to so much. Of persons of
+"""A segment out of sight is known where markers that skin moves by so much show its joint to so much. Of a person of
 `truth3d` thighs between pelvis and shank come to 2 to 7 deg (five markers on the shank) and are as sure as said, shanks
 between thigh and foot to 5; upper arms between trunk and wrist to 16 and more, bent as they may be, and are up to 115
 deg off."""
@@ -100,7 +100,7 @@ class Shown:
     def _shows(self, k: int, state: Array, used: Flags, hidden: set[str]) -> bool:
         above = self._above[k]
         ends = [end for end in self._beyond[k] if self._names[end] not in hidden]
-        if not ends or (above >= 0 and self._names[above] in hidden):
+        if not ends or (above >= 0 and self._names[above] in hidden) or not np.isfinite(state).all():
             return False
         own = self._between(above, k)
         columns = list(dict.fromkeys(column for end in ends for column in self._between(above, end)))
