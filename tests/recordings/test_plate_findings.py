@@ -262,7 +262,7 @@ def test_plates_without_numbers_while_nobody_is_on_them_are_empty() -> None:
     recording = blanked(full, gaps)
     assert not foot_loads(recording, LABORATORY, FOOT_MARKERS).total_known.any()
     found, said = without_blanks(recording, LABORATORY, FOOT_MARKERS)
-    assert [str(each) for each in said] == ["p0, p2, p1, p3: no numbers while no foot is there, taken as empty."]
+    assert [str(each) for each in said] == ["p0, p2, p1, p3: no numbers while no foot is near, taken as empty there."]
     loads, before = (foot_loads(each, LABORATORY, FOOT_MARKERS) for each in (found, full))
     assert np.count_nonzero(loads.all_measured) > 0.9 * np.count_nonzero(before.all_measured)
     known = loads.total_known

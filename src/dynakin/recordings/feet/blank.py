@@ -38,5 +38,5 @@ def without_blanks(
             emptied.append(plate.name)
     if not emptied:
         return recording, []
-    text = f"{', '.join(emptied)}: no numbers while no foot is there, taken as empty."
+    text = f"{', '.join(emptied)}: no numbers while no foot is near, taken as empty there."
     return recording.with_plates(tuple(plates)), [note("plates", text)]
