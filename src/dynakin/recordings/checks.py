@@ -16,6 +16,7 @@ from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.feet.places import foot_places
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.orientation import nearest_axis
 from dynakin.recordings.plates.ground_plate import SHOE_M
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
@@ -160,9 +161,10 @@ def _lying(plates: Sequence[Plate], ground: GroundFrame) -> str | None:
     total = _total_force(plates)
     size = np.linalg.norm(total, axis=1)
     mean = total[size > 0.5 * size.max()].mean(axis=0) if size.max() > LYING_N[0] else np.zeros(3)
-    (axis, along), upwards = _nearest_axis(mean), abs(ground.vectors_to_ground(mean)[1])
+    along, upwards = np.abs(mean).max(), abs(ground.vectors_to_ground(mean)[1])
     if not LYING_N[0] < along < LYING_N[1] or upwards > LYING * along:
         return None
+    axis = nearest_axis(mean)
     return (
         f"the forces lie along {axis} ({along:.0f} N on average while loaded), vertical is {ground.vertical}: "
         f"give the forces in the axes of the markers; of a person who lies, give the vertical (--vertical {axis})"
@@ -197,7 +199,8 @@ def _idle(
         )
     unit = likely_unit(while_loaded(np.sum(pushes, axis=0)), steps_kg)
     perhaps = f", and whether they are in {unit}, not N" if unit else ""
-    axis, along = _nearest_axis(_total_force(recording.plates).mean(axis=0))
+    mean = _total_force(recording.plates).mean(axis=0)
+    axis, along = nearest_axis(mean), np.abs(mean).max()
     lies = (
         f" They are pushed along {axis} ({along:.0f} N on average), the vertical is {ground.vertical}: of a person who "
         f"lies, or is on hands and feet, give the vertical (--vertical {axis})."
@@ -212,12 +215,6 @@ def _idle(
 def _total_force(plates: Sequence[Plate]) -> Array:
     """(T, 3) N of all plates; a plate without numbers gives nothing."""
     return np.asarray(np.sum([np.nan_to_num(plate.force) for plate in plates], axis=0))
-
-
-def _nearest_axis(force: Array) -> tuple[str, float]:
-    """The laboratory axis that a force (3,) N is nearest to, and how much it is along that."""
-    k = int(np.argmax(np.abs(force)))
-    return f"{'+' if force[k] > 0.0 else '-'}{'XYZ'[k]}", float(abs(force[k]))
 
 
 def _beside(plate: Plate, ground: GroundFrame, feet: Mapping[str, Array]) -> bool:

@@ -140,6 +140,12 @@ for who faces it within 45 deg."""
 AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
 
 
+def nearest_axis(direction: Array) -> str:
+    """The laboratory axis, by its name, that is nearest to a direction (3,)."""
+    k = int(np.argmax(np.abs(direction)))
+    return ("+" if direction[k] > 0.0 else "-") + "XYZ"[k]
+
+
 def axis_vector(axis: str) -> Array:
     """Unit vector (3,) of "+X", "-Y", ... ("Z" alone is "+Z").
 

@@ -14,7 +14,7 @@ import numpy as np
 from dynakin.arrays import mean_seen
 from dynakin.errors import RecordingError
 from dynakin.recordings.landmarks import FacingPairs, find_marker, mean_position, present_pairs
-from dynakin.recordings.orientation import AXES, axis_vector, walks
+from dynakin.recordings.orientation import AXES, axis_vector, nearest_axis, walks
 from dynakin.recordings.recording import Array, Recording
 
 _MIN_SHARE = 0.8  # how much of a direction an axis must hold to be taken for it (37 deg)
@@ -62,9 +62,10 @@ def find_vertical(recording: Recording, pairs: FacingPairs, static: Recording | 
             another axis than the body does.
     """
     standing = None if static is None or static is recording else _StandingFloor.of(static, pairs)
+    body, plates = _from_body(recording, pairs), _from_plates(recording)
     witnesses: list[tuple[str, Callable[[], str | None]]] = [
-        ("the body above the feet", lambda: _from_body(recording, pairs)),
-        ("the plates' force", lambda: _from_plates(recording)),
+        ("the body above the feet", lambda: body),
+        ("the plates' force", lambda: plates),
         ("the standing trial", lambda: standing.vertical if standing else None),
         ("the longer side of the markers' box", lambda: _from_spread(recording)),
         ("the file's Y_SCREEN", lambda: _from_screen(recording)),
@@ -73,9 +74,8 @@ def find_vertical(recording: Recording, pairs: FacingPairs, static: Recording | 
     if not found:
         where = recording.path or recording.name
         raise RecordingError(f"{where}: vertical axis not found, expected it to be given")
-    body = _from_body(recording, pairs)
     if body is not None:
-        surer = _surer_than_the_body(recording, body, standing)
+        surer = _surer_than_the_body(recording, body, plates, standing)
         found.sort(key=lambda one: one[1] != surer)  # the witnesses of that axis first, in their order
     why, vertical = found[0]
     agree = [other for other, axis in found[1:] if axis == vertical]
@@ -93,7 +93,7 @@ def against_vertical(recording: Recording, axis: str, pairs: FacingPairs) -> tup
     return ("", False) if body == axis else (body, _from_plates(recording) == body)
 
 
-def _surer_than_the_body(recording: Recording, body: str, standing: _StandingFloor | None) -> str:
+def _surer_than_the_body(recording: Recording, body: str, plates: str | None, standing: _StandingFloor | None) -> str:
     """The axis that points up, where the body's own is known: another one where plates bear the person along it and
     the standing trial says so too, or they press from below; or where the standing trial's floor is under the person
     along it, and along the body's own is not.
@@ -101,7 +101,6 @@ def _surer_than_the_body(recording: Recording, body: str, standing: _StandingFlo
     Raises:
         RecordingError: the standing trial says another one, and its floor shows nothing, or both.
     """
-    plates = _from_plates(recording)
     upright = standing.vertical if standing else body
     if {plates or body, upright} == {body} or walks(recording, axis_vector(body)):
         return body
@@ -155,10 +154,7 @@ def _name(direction: Array) -> str | None:
     length = float(np.linalg.norm(direction))
     if not np.isfinite(length) or length < 1e-9:
         return None
-    k = int(np.argmax(np.abs(direction)))
-    if abs(direction[k]) < _MIN_SHARE * length:
-        return None
-    return ("+" if direction[k] > 0 else "-") + "XYZ"[k]
+    return None if np.abs(direction).max() < _MIN_SHARE * length else nearest_axis(direction)
 
 
 def _from_body(recording: Recording, pairs: FacingPairs) -> str | None:

@@ -31,7 +31,6 @@ from dynakin.filter.ground.declared import (
     taken_in_words,
 )
 from dynakin.filter.ground.delay import Delay, brought_into_step
-from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion, pressed_at
@@ -122,12 +121,13 @@ class GroundTrial:
 
 
 @dataclass(frozen=True, eq=False)
-class Footing:
+class OnGround:
     """Who stands where, by feet and plates.
 
     Attributes:
         loads: of each foot; None of a model that stands on its root.
-        may: (T, C) frames in which each declared contact may bear. by_plate: (C,) those that a plate measures; taken:
+        paths: (T, 1 + C, 3) m where the root and the declared contacts are.
+        may: (T, C) frames in which each of these may bear. by_plate: (C,) those that a plate measures; taken:
             plates that are theirs though nobody said so.
         check: of the plates; None without any. shear: what is known of their horizontal forces before they are judged.
         needed: what the motion needs; None of a model that stands on its root.
@@ -135,6 +135,7 @@ class Footing:
 
     trial: GroundTrial
     loads: FootLoads | None
+    paths: Array
     may: Flags
     by_plate: list[bool]
     taken: Mapping[str, tuple[str, ...]]
@@ -143,7 +144,7 @@ class Footing:
     needed: Needed | None
 
     @staticmethod
-    def of(trial: GroundTrial) -> Footing:
+    def of(trial: GroundTrial) -> OnGround:
         """Of a trial.
 
         Raises:
@@ -158,7 +159,7 @@ class Footing:
             loads = _loads_of_feet(trial, taken) if taken else loads
         by_plate = [loads is not None and name in loads.others for name in initial.contacts]
         may &= ~np.array(by_plate, dtype=bool)
-        found = Footing(trial, loads, may, by_plate, taken, None, NO_SHEAR, None)
+        found = OnGround(trial, loads, paths, may, by_plate, taken, None, NO_SHEAR, None)
         if not recording.plates:
             return found
         # steps off the plates: their mean load is no mass
@@ -197,7 +198,7 @@ class Footing:
         if self.check is None:
             return self._without_plates()
         if self.check.unused:
-            ground, nothing = Footing.of(self.trial.without_plates()).judged()
+            ground, nothing = OnGround.of(self.trial.without_plates()).judged()
             loads = ground.loads
             if loads is not None:  # the recording keeps its plates, with nobody on any
                 on = np.zeros((len(nothing), len(loads.feet), len(self.trial.recording.plates)), dtype=bool)
@@ -281,7 +282,7 @@ class Footing:
     @property
     def _places(self) -> Array:
         """(T, C, 3) m of those."""
-        return ContactPaths.of(self.trial.initial).at(self.trial.markers)[:, [1 + c for c in self._unmeasured]]
+        return self.paths[:, [1 + c for c in self._unmeasured]]
 
     def _sensors(
         self, needed: Needed, loads: FootLoads, first: Carried | None

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in_words, out_of_step_in_words
 from dynakin.filter.ground.fine_delay import UNKNOWN_S, clock_delay
-from dynakin.filter.ground.judged import Footing, Ground, GroundTrial
+from dynakin.filter.ground.judged import Ground, GroundTrial, OnGround
 from dynakin.filter.ground.plate_sum import MASS_APART
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -58,13 +58,13 @@ def known_ground(
         RecordingError: the plates are refused.
     """
     trial, zeros = _zeroed(GroundTrial(recording, initial, markers, assigned, tolerance))
-    as_it_is = Footing.of(trial)
+    as_it_is = OnGround.of(trial)
     coarse = as_it_is.coarse_delay()
-    footing = as_it_is if coarse is None else Footing.of(trial.in_step(coarse))
-    ground, known = footing.judged()
+    on_ground = as_it_is if coarse is None else OnGround.of(trial.in_step(coarse))
+    ground, known = on_ground.judged()
     clock = _Clock(coarse, 0.0 if coarse is None else coarse.sd_s, ())
     if ground.loads is not None and ground.loads.on.any():
-        clock, ground, known = _in_step(as_it_is, coarse, footing, ground, known)
+        clock, ground, known = _in_step(as_it_is, coarse, on_ground, ground, known)
     moved = () if clock.taken is None else (_taken_in_words(clock.taken, recording, not initial.unseen_kg),)
     behind_s = 0.0 if clock.taken is None else clock.taken.delay_s
     notes = (*zeros, *moved, *ground.notes, *clock.notes)
@@ -81,24 +81,24 @@ class _Clock(NamedTuple):
 
 
 def _in_step(
-    as_it_is: Footing, coarse: Delay | None, footing: Footing, ground: Ground, known: Array
+    as_it_is: OnGround, coarse: Delay | None, on_ground: OnGround, ground: Ground, known: Array
 ) -> tuple[_Clock, Ground, Array]:
     """How far the plates are out of step, to a millisecond or two where the movement shows it, and what is known of
     the ground once they are not.
 
     Args:
-        coarse: the delay that ``footing``, and what was judged of it (``ground``, ``known`` (T, 6)), are without.
+        coarse: the delay that ``on_ground``, and what was judged of it (``ground``, ``known`` (T, 6)), are without.
     """
     trial, initial = as_it_is.trial, as_it_is.trial.initial
     whole, fine, left = not initial.unseen_kg, None, None
     for _ in range(ROUNDS):
-        plates = footing.trial.wrenches
+        plates = on_ground.trial.wrenches
         left = clock_delay(initial, trial.recording.time, trial.markers, known, not says_carried(ground.notes), plates)
         if left is None or not left.worth_it(whole or coarse is not None or fine is not None):
             break
         fine = left.after(fine or coarse or IN_STEP)
-        footing = Footing.of(trial.in_step(fine))
-        ground, known = footing.judged()
+        on_ground = OnGround.of(trial.in_step(fine))
+        ground, known = on_ground.judged()
         if whole and not left.apart:
             break
     if fine is not None and fine.worth_it(whole):
