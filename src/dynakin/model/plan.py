@@ -84,11 +84,7 @@ class ModelPlan:
 
     def marked(self) -> set[str]:
         """Segments that have markers, or between two that do."""
-        found = {site.segment for site in self.sites}
-        for segment in reversed(self.model.segments):  # children stand after their parents
-            if segment.name in found and segment.parent != "ground":
-                found.add(segment.parent)
-        return found
+        return set(self.model.tree.up(*(site.segment for site in self.sites)))
 
     def _length_sd(self) -> dict[str, float]:
         """Of lengths that are known otherwise than to a part of their value."""

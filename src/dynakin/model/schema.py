@@ -15,6 +15,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from dynakin.model.mirroring import SUFFIXES, mirrored
 from dynakin.settings.strict import CoordinateName, Name, Strict, nearest
+from dynakin.tree import Tree
 from dynakin.units import GRAVITY_M_S2, gravity_problem
 
 Vector3 = Annotated[tuple[float, float, float], Field(description="three numbers")]
@@ -233,6 +234,11 @@ class ModelFile(Strict):
         return {s.side: s.name for s in self.segments if s.side is not None and "foot" in s.parts}
 
     @property
+    def tree(self) -> Tree:
+        """Which segment hangs on which."""
+        return Tree.of(self.segments)
+
+    @property
     def sided(self) -> bool:
         """Whether right and left limbs are modelled apart."""
         return any(segment.side is not None for segment in self.segments)
@@ -240,8 +246,8 @@ class ModelFile(Strict):
     @property
     def floating(self) -> bool:
         """Whether the body may be anywhere and head anywhere: one root with six free coordinates without limits."""
-        roots = [segment for segment in self.segments if segment.parent == "ground"]
-        own = {axis.coordinate for segment in roots for axis in segment.axes}
+        roots = self.tree.roots
+        own = {axis.coordinate for segment in self.segments if segment.name in roots for axis in segment.axes}
         free = {c.name for c in self.coordinates if not c.locked and not np.isfinite(c.limits).any()}
         return self.sided and self.ground.origin is None and len(roots) == 1 and len(own & free) == len(own) == 6
 
@@ -296,12 +302,12 @@ class ModelFile(Strict):
                     _need(axis.scale, lengths, f"{where}: axes.scale", "a name in lengths")
                 used.add(axis.coordinate)
             seen.append(segment.name)
-        parents = {segment.name: segment.parent for segment in self.segments}
+        tree = self.tree
         for segment in self.segments:
             if segment.without_markers is not None:
                 other = segment.without_markers.lock_to
-                _need(other, parents, f'segments "{segment.name}": without_markers.lock_to', "a segment")
-                if parents[segment.name] != other and parents[other] != segment.name:
+                _need(other, tree.parents, f'segments "{segment.name}": without_markers.lock_to', "a segment")
+                if not tree.adjacent(segment.name, other):
                     raise ValueError(
                         f'segments "{segment.name}": without_markers.lock_to: {other!r} is '
                         "no neighbour of it in the tree"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -21,6 +20,7 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import level_pressure
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
+from dynakin.tree import Tree
 
 Array = npt.NDArray[np.float64]
 Hips = Literal["measured", "supposed", "proportions"]
@@ -170,6 +170,11 @@ class CalibratedModel(StartingState):
         return [warning("physique", text)]
 
     @property
+    def tree(self) -> Tree:
+        """Which segment hangs on which."""
+        return Tree.of(self.spec.segments)
+
+    @property
     def weighed_kg(self) -> float:
         """What the plates carry: the person and the known loads, kg."""
         return self.mass_kg + self.carried_kg
@@ -183,13 +188,9 @@ class CalibratedModel(StartingState):
     def unmarked_feet(self) -> dict[str, str]:
         """Those of ``feet`` that no marker shows, nor what hangs on them; a single one is none where the other foot has
         more: it shows neither how the foot lies nor where its load may be."""
-        parents = {segment.name: segment.parent for segment in self.spec.segments}
-        shown = Counter(marker.segment for marker in self.spec.markers)
-        for name in reversed(list(parents)):  # children stand after their parents
-            if shown[name] and parents[name] in self.feet.values():
-                shown[parents[name]] += shown[name]
-        least = 2 if max((shown[name] for name in self.feet.values()), default=0) > 1 else 1
-        return {side: name for side, name in self.feet.items() if shown[name] < least}
+        shown = {side: len(own) for side, own in self._on_feet().items()}
+        least = 2 if max(shown.values(), default=0) > 1 else 1
+        return {side: foot for side, foot in self.feet.items() if shown[side] < least}
 
     @property
     def markers_on_feet(self) -> dict[str, list[str]]:
@@ -197,14 +198,12 @@ class CalibratedModel(StartingState):
         `unmarked_feet`. Of a model fixed in the ground: ``foot_markers``."""
         if not self.feet:
             return self.foot_markers
-        parents = {segment.name: segment.parent for segment in self.spec.segments}
+        return {side: [] if side in self.unmarked_feet else own for side, own in self._on_feet().items()}
 
-        def on(segment: str, foot: str) -> bool:
-            return segment == foot or (segment in parents and on(parents[segment], foot))
-
-        pairs = list(zip(self.recorded_markers, self.spec.markers, strict=True))
+    def _on_feet(self) -> dict[str, list[str]]:
+        tree, pairs = self.tree, list(zip(self.recorded_markers, self.spec.markers, strict=True))
         return {
-            side: [] if side in self.unmarked_feet else [name for name, m in pairs if on(m.segment, foot)]
+            side: [name for name, marker in pairs if marker.segment in (foot, *tree.below(foot))]
             for side, foot in self.feet.items()
         }
 

@@ -91,7 +91,7 @@ def _segment(initial: CalibratedModel, contact: DeclaredContact) -> str:
             )
         return contact.segment
     if contact.name == SEAT:
-        return next(segment.name for segment in initial.spec.segments if segment.parent == "ground")
+        return initial.tree.roots[0]
     for name in _spellings(contact.name):
         if name in names:
             return name

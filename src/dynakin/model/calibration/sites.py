@@ -102,10 +102,7 @@ def find_locks(
     }
     bare: dict[str, tuple[str, ...]] = {}
     messages, lacking = list[Message](), list[str]()
-    marked = {name for name, count in counts.items() if count}
-    for segment in reversed(model.segments):  # children stand after their parents
-        if segment.name in marked:
-            marked.add(segment.parent)
+    marked = model.tree.up(*(name for name, count in counts.items() if count))
     for name, count in counts.items():
         segment = by_name[name]
         if count == 1:
@@ -250,13 +247,8 @@ def skin_since_standing(
 def _legs(model: ModelFile) -> dict[str, str]:
     """Segment -> parent, of hips, knees and ankles. Arms that stand otherwise than they move later move the skin of
     shoulders, and leave the rest of a trunk where it was."""
-    parents = {segment.name: segment.parent for segment in model.segments}
-    found: dict[str, str] = {}
-    for segment in model.feet.values():
-        while parents[segment] != "ground":
-            found[segment] = parents[segment]
-            segment = parents[segment]
-    return found
+    tree = model.tree
+    return {name: tree.parents[name] for name in tree.up(*model.feet.values()) if name not in tree.roots}
 
 
 def _directions(standing: Array, paths: Array) -> tuple[Array, Array]:

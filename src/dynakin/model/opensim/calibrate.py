@@ -164,6 +164,6 @@ def foot_markers(
     """Side -> the recorded names of the markers on its foot, and on what hangs on that (toes)."""
     found = {}
     for side, foot in feet.items():
-        bodies = {foot} | {joint.child for joint in source.joints if joint.parent == foot}
+        bodies = (foot, *source.tree.below(foot))
         found[side] = [name for marker, name in chosen if marker.body in bodies]
     return found

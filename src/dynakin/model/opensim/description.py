@@ -13,6 +13,7 @@ import scipy
 from dynakin.errors import ModelError
 from dynakin.model.inertia import RigidBody
 from dynakin.model.opensim.functions import Function
+from dynakin.tree import Tree
 
 GROUND = "ground"
 """Name of what the first body hangs on."""
@@ -162,6 +163,11 @@ class OpenSimModel:
         return sum(body.mass for body in self.bodies)
 
     @property
+    def tree(self) -> Tree:
+        """Which body hangs on which."""
+        return Tree((joint.child for joint in self.joints), (joint.parent for joint in self.joints))
+
+    @property
     def floating(self) -> tuple[str, ...]:
         """The six coordinates by which the body may be anywhere in the ground; none where it is held in some way."""
         roots = [joint for joint in self.joints if joint.parent == GROUND]
@@ -177,9 +183,8 @@ def person_of(source: OpenSimModel) -> OpenSimModel:
     Raises:
         ModelError: markers on several trees, or a coordinate of the person that follows one of what is left out.
     """
-    root: dict[str, str] = {}
-    for joint in source.joints:  # parents stand before their children
-        root[joint.child] = joint.child if joint.parent == GROUND else root[joint.parent]
+    tree = source.tree
+    root = {name: tree.up(name)[-1] for name in tree.parents}
     marked: dict[str, list[str]] = {}
     for marker in source.markers:
         if marker.body != GROUND:

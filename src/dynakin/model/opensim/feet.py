@@ -53,21 +53,10 @@ def _checked(source: OpenSimModel, feet: dict[str, str]) -> dict[str, str]:
 
 
 def _problem(source: OpenSimModel, feet: Mapping[str, str]) -> str:
-    right, left = feet["right"], feet["left"]
-    if right in _up_from(source, left) or left in _up_from(source, right):
+    right, left, tree = feet["right"], feet["left"], source.tree
+    if right in tree.up(left) or left in tree.up(right):
         return f"found {right} and {left} on one leg"
-    roots = {joint.child for joint in source.joints if joint.parent == GROUND}
-    return "".join(f"found {body}, which hangs on nothing" for body in feet.values() if body in roots)
-
-
-def _up_from(source: OpenSimModel, body: str) -> list[str]:
-    """The body and all that it hangs on."""
-    parents = {joint.child: joint.parent for joint in source.joints}
-    chain = []
-    while body in parents:
-        chain.append(body)
-        body = parents[body]
-    return chain
+    return "".join(f"found {body}, which hangs on nothing" for body in feet.values() if body in tree.roots)
 
 
 def _by_name(source: OpenSimModel, words: tuple[str, ...]) -> dict[str, str]:

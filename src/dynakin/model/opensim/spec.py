@@ -45,26 +45,15 @@ def placements(model: OpenSimModel, scales: Mapping[str, str]) -> dict[str, Plac
 def unseen(model: OpenSimModel, bodies: Collection[str]) -> list[str]:
     """Independent coordinates that move none of these bodies and are not locked by the file."""
     placed = placements(model, {})
-    parents = {joint.child: joint.parent for joint in model.joints}
-    seen: set[str] = set()
-    for body in bodies:
-        at = body
-        while at != GROUND:
-            seen |= {axis.coordinate for axis in placed[at].axes}
-            at = parents[at]
+    seen = {axis.coordinate for body in model.tree.up(*bodies) for axis in placed[body].axes}
     return [c.name for c in independent_coordinates(model) if c.name not in seen and not c.locked]
 
 
 def moved_by(model: OpenSimModel, coordinates: Collection[str]) -> set[str]:
     """Bodies that one of these coordinates moves."""
     placed = placements(model, {})
-    parents = {joint.child: joint.parent for joint in model.joints}
-
-    def moved(body: str) -> bool:
-        own = any(axis.coordinate in coordinates for axis in placed[body].axes)
-        return own or (parents[body] != GROUND and moved(parents[body]))
-
-    return {body for body in parents if moved(body)}
+    own = [body for body, on in placed.items() if any(axis.coordinate in coordinates for axis in on.axes)]
+    return {*own, *model.tree.below(*own)}
 
 
 def used_scales(placed: Mapping[str, Placed]) -> list[str]:
@@ -95,8 +84,7 @@ def to_spec(
         values: coordinates at the start, by name; the file's defaults where not given.
         lock: coordinates that are locked in addition to those of the file.
     """
-    placed = placements(model, scales)
-    parents = {joint.child: joint.parent for joint in model.joints}
+    placed, tree = placements(model, scales), model.tree
     start = dict(values or {})
     moving = {axis.coordinate for segment in placed.values() for axis in segment.axes}
     sites = [m for m in model.markers if m.body != GROUND] if markers is None else markers
@@ -111,7 +99,7 @@ def to_spec(
         segments=[
             _core.SegmentSpec(
                 name=name,
-                parent=parents[name],
+                parent=tree.parents[name],
                 rotation=segment.rotation,
                 translation=segment.translation,
                 lengths=[_core.LengthTerm(parameter, direction) for parameter, direction in segment.terms],
