@@ -13,6 +13,7 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.results.records import Event, Parameter, Timing, Tracking
 from dynakin.settings.lag import ALL_FRAMES
+from dynakin.tree import Tree
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +26,11 @@ DIMENSIONS = ("time", "coordinate", "marker", "foot", "joint", "sensor", "elemen
 def values_of(data: xr.Dataset, name: str) -> np.ndarray:
     """A variable of an `Estimate`'s data as an array, its dimensions as in the table there."""
     return np.asarray(data[name].transpose(*DIMENSIONS, missing_dims="ignore").values)
+
+
+def tree_of(data: xr.Dataset) -> Tree:
+    """Which segment hangs on which, of the joints of an `Estimate`'s data."""
+    return Tree.numbered([str(name) for name in data["joint_segment"].values], data["joint_parent"].values)
 
 
 def known_of(data: xr.Dataset, name: str) -> np.ndarray:

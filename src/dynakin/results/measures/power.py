@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate, tree_of
 from dynakin.results.measures.stances import counted
 
 Array = npt.NDArray[np.float64]
@@ -41,8 +41,7 @@ def root_coordinates(estimate: Estimate) -> set[str]:
     """Coordinates of the joints by which the body hangs on the ground; empty where an estimate does not hold them."""
     if "coordinate_segment" not in estimate.data.coords:
         return set()
-    parents = estimate.data["joint_parent"].values
-    roots = {str(s) for s in estimate.data["joint_segment"].values[parents < 0]}
+    roots = tree_of(estimate.data).roots
     segments = estimate.data["coordinate_segment"].values
     return {n for n, s in zip(estimate.coordinate_names, segments, strict=True) if str(s) in roots}
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.recordings.feet.contact import SHARED_PLATE, UNMEASURED
 from dynakin.recordings.times import span
-from dynakin.results.estimate import Estimate, values_of
+from dynakin.results.estimate import Estimate, tree_of, values_of
 from dynakin.results.naming import listed, sentence, words
 from dynakin.results.records import REFUSED
 
@@ -210,38 +210,20 @@ def legs_of(data: xr.Dataset) -> list[str]:
     """
     if "coordinate_segment" not in data.coords or "joint_parent" not in data.coords:
         return [""] * data.sizes["coordinate"]
-    segments = [str(name) for name in data["joint_segment"].values]
-    parents = [int(parent) for parent in data["joint_parent"].values]
-    legs = [""] * len(segments)
+    tree, legs = tree_of(data), dict[str, str]()
     if "foot_segment" in data.coords:
         others = data["foot_declared"].values if "foot_declared" in data.coords else np.zeros(data.sizes["foot"], bool)
         chains = {
-            str(foot): _up_from(segments.index(str(segment)), parents)
+            str(foot): tree.up(str(segment))
             for foot, segment, declared in zip(data["foot"].values, data["foot_segment"].values, others, strict=True)
             if not declared
         }
         for foot, chain in chains.items():
-            shared = {k for other, every in chains.items() if other != foot for k in every}
-            for k in chain:
-                if parents[k] >= 0 and k not in shared:
-                    legs[k] = foot
+            shared = {name for other, every in chains.items() if other != foot for name in every}
+            legs |= {name: foot for name in chain if name not in shared and name not in tree.roots}
     else:
-        for k, name in enumerate(segments):
-            if parents[k] >= 0 and parents[parents[k]] < 0:
-                legs[k] = _side(name)
-    for k, parent in enumerate(parents):  # parents stand before their children
-        if parent >= 0 and not legs[k]:
-            legs[k] = legs[parent]
-    carried = dict(zip(segments, legs, strict=True))
-    return [carried[str(name)] for name in data["coordinate_segment"].values]
-
-
-def _up_from(k: int, parents: list[int]) -> list[int]:
-    chain = []
-    while k >= 0:
-        chain.append(k)
-        k = parents[k]
-    return chain
+        legs = {name: _side(name) for name, parent in tree.parents.items() if parent in tree.roots and _side(name)}
+    return [legs.get(tree.nearest(str(name), legs), "") for name in data["coordinate_segment"].values]
 
 
 def _side(segment: str) -> str:
@@ -301,9 +283,9 @@ def _toes(data: xr.Dataset) -> set[int]:
     """Columns of coordinates that move what hangs on a foot: absent when it bears load, which says nothing of a leg."""
     if "foot_segment" not in data.coords or "joint_parent" not in data.coords:
         return set()
-    segments = [str(name) for name in data["joint_segment"].values]
-    feet = {segments.index(str(name)) for name in data["foot_segment"].values}
-    hung = {segments[k] for k, parent in enumerate(data["joint_parent"].values) if int(parent) in feet - {0}}
+    tree = tree_of(data)
+    feet = {str(name) for name in data["foot_segment"].values}.difference(tree.roots)
+    hung = {name for name, parent in tree.parents.items() if parent in feet}
     return {k for k, name in enumerate(data["coordinate_segment"].values) if str(name) in hung}
 
 
