@@ -10,10 +10,9 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.sight import next_marked
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE
-from dynakin.results.estimate import values_of
+from dynakin.results.estimate import tree_of, values_of
 from dynakin.results.measures.sources import (
     ABSENT,
     DERIVED,
@@ -22,6 +21,7 @@ from dynakin.results.measures.sources import (
     contact_sources,
     refused_for_long,
 )
+from dynakin.tree import Tree
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -67,7 +67,7 @@ def with_sources(
 
     found: dict[str, Any] = {}
     segments = [str(name) for name in data["joint_segment"].values]
-    parents = data["joint_parent"].values
+    tree = tree_of(data)
     moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
     blind = np.isnan(values_of(data, "wrench_measured")).all(axis=1)
     refused = refused_for_long(data)
@@ -84,16 +84,16 @@ def with_sources(
         there = xr.DataArray(contacts != ABSENT, dims=("time", "foot"))
         found["foot_source"] = (("time", "foot"), contacts)
         found |= {name: data[name].where(there) for name in ("foot_wrench", "foot_wrench_sd") if name in data}
-        joints = _behind(contacts, [segments.index(name) for name in feet.segments], parents)
-        legs = _below_the_thighs([segments.index(name) for name in soles], parents)
+        joints = _behind(contacts, feet.segments, tree)
+        legs = _below_the_thighs(soles, tree)
         moments = np.maximum(values_of(data, "moment_source"), np.where(refused[:, None], joints[:, moved], MEASURED))
     joints[np.ix_(undeclared, ~legs)] = ABSENT
     if feet is not None:
-        joints[_beyond(feet, soles, segments, parents)] = ABSENT
-    gone = _gone(hidden or {}, segments, parents, len(joints))
+        joints[_beyond(feet, soles, tree)] = ABSENT
+    gone = _gone(hidden or {}, tree, len(joints))
     joints[gone] = ABSENT
     if carried:
-        joints[:, _over_the_legs([segments.index(name) for name in soles], parents)] = ABSENT
+        joints[:, _over_the_legs(soles, tree)] = ABSENT
     moments[joints[:, moved] == ABSENT] = ABSENT
     moments[:, np.isin(data["coordinate"].values, list(held))] = ABSENT
     known, borne = moments != ABSENT, joints != ABSENT
@@ -113,18 +113,16 @@ def with_sources(
     return data.assign(found)  # all at once: each time takes 10 ms
 
 
-def _gone(hidden: Hidden, segments: list[str], parents: npt.NDArray[np.int_], frames: int) -> Flags:
+def _gone(hidden: Hidden, tree: Tree, frames: int) -> Flags:
     """(T, J) joints of a segment that lies nobody knows how; segments that never have markers are passed over."""
-    gone = np.zeros((frames, len(segments)), dtype=bool)
+    gone = np.zeros((frames, len(tree.parents)), dtype=bool)
     if not any(own.any() for own in hidden.values()):
         return gone
-    above, beyond = next_marked(parents, [name in hidden for name in segments])
-    for k, name in enumerate(segments):
-        ends = [k] if name in hidden else beyond[k]
-        if ends:
-            gone[:, k] = np.logical_and.reduce([hidden[segments[end]] for end in ends])
-        if above[k] >= 0:
-            gone[:, k] |= hidden[segments[above[k]]]
+    for k, (name, parent) in enumerate(tree.parents.items()):
+        if ends := [name] if name in hidden else tree.next_below(name, hidden):
+            gone[:, k] = np.logical_and.reduce([hidden[end] for end in ends])
+        if above := tree.nearest(parent, hidden):
+            gone[:, k] |= hidden[above]
     return gone
 
 
@@ -140,12 +138,10 @@ class ContactSources:
     ) -> None:
         self._unmarked = unmarked
         self._held = np.array([c.name in held for c in spec.coordinates], dtype=bool)
-        self._segments = [segment.name for segment in spec.segments]
-        self._parents = np.array([_place(self._segments, segment.parent) for segment in spec.segments])
-        self._moved = [self._segments.index(name) for name in moved_segments(spec)]
+        self._tree, segments = Tree.of(spec.segments), [segment.name for segment in spec.segments]
+        self._moved = [segments.index(name) for name in moved_segments(spec)]
         self._soles = tuple(soles)
-        at = [self._segments.index(name) for name in soles]
-        self._legs, self._over_the_legs = _below_the_thighs(at, self._parents), _over_the_legs(at, self._parents)
+        self._legs, self._over_the_legs = _below_the_thighs(soles, self._tree), _over_the_legs(soles, self._tree)
 
     @classmethod
     def of(cls, initial: CalibratedModel) -> ContactSources:
@@ -154,7 +150,7 @@ class ContactSources:
 
     def unseen(self, hidden: Hidden, frames: int) -> Flags:
         """(T, C) coordinates of joints of which nothing is known, by their segments (`hidden_segments`)."""
-        return _gone(hidden, self._segments, self._parents, frames)[:, self._moved]
+        return _gone(hidden, self._tree, frames)[:, self._moved]
 
     def moments(self, feet: ContactLoads | None, *, refused: bool = False, carried: bool = False) -> Codes:
         """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody
@@ -166,11 +162,10 @@ class ContactSources:
         if feet is None:
             return np.where(self._held, ABSENT, MEASURED).astype(np.uint8)[None]
         undeclared = feet.undeclared
-        at = [self._segments.index(name) for name in feet.segments]
         contacts = _contacts(feet, undeclared, self._unmarked, np.full(len(undeclared), refused))
-        joints = _behind(contacts, at, self._parents)
+        joints = _behind(contacts, feet.segments, self._tree)
         joints[np.ix_(undeclared, ~self._legs)] = ABSENT
-        joints[_beyond(feet, self._soles, self._segments, self._parents)] = ABSENT
+        joints[_beyond(feet, self._soles, self._tree)] = ABSENT
         if carried:
             joints[:, self._over_the_legs] = ABSENT
         return np.where(self._held, ABSENT, joints[:, self._moved]).astype(np.uint8)
@@ -193,51 +188,34 @@ def moved_segments(spec: _core.ModelSpec) -> list[str]:
     return [first[c.name] for c in spec.coordinates]
 
 
-def _place(names: list[str], name: str) -> int:
-    return names.index(name) if name in names else -1
+def _flags(names: Collection[str], tree: Tree) -> Flags:
+    return np.array([name in names for name in tree.parents], dtype=bool)
 
 
-def _behind(contacts: Codes, at: list[int], parents: npt.NDArray[np.int_]) -> Codes:
+def _behind(contacts: Codes, at: Sequence[str], tree: Tree) -> Codes:
     """(T, J) codes of the joints' loads: the worst of the contacts' (T, C) that lie behind each."""
-    joints = np.zeros((len(contacts), len(parents)), dtype=np.uint8)
+    joints = np.zeros((len(contacts), len(tree.parents)), dtype=np.uint8)
     for k, segment in enumerate(at):
-        while segment >= 0:
-            joints[:, segment] = np.maximum(joints[:, segment], contacts[:, k])
-            segment = int(parents[segment])
+        on = _flags(tree.up(segment), tree)
+        joints[:, on] = np.maximum(joints[:, on], contacts[:, k, None])
     return joints
 
 
-def _beyond(feet: ContactLoads, soles: Collection[str], segments: list[str], parents: npt.NDArray[np.int_]) -> Flags:
+def _beyond(feet: ContactLoads, soles: Collection[str], tree: Tree) -> Flags:
     """(T, J) joints that hang on a foot (toes) while it bears load: how much of it lies beyond them nobody measures."""
-    found = np.zeros((len(feet.contact), len(parents)), dtype=bool)
-    bears = {
-        segments.index(name): feet.contact[:, k] != NO_CONTACT for k, name in enumerate(feet.segments) if name in soles
-    }
-    for k, parent in enumerate(parents):  # parents stand before their children
-        if parent >= 0:
-            found[:, k] = bears.get(int(parent), found[:, parent])
+    found = np.zeros((len(feet.contact), len(tree.parents)), dtype=bool)
+    bears = {name: feet.contact[:, k] != NO_CONTACT for k, name in enumerate(feet.segments) if name in soles}
+    for name, loaded in bears.items():
+        found |= np.outer(loaded, _flags(tree.below(name), tree))
     return found
 
 
-def _over_the_legs(at: list[int], parents: npt.NDArray[np.int_]) -> Flags:
+def _over_the_legs(soles: Collection[str], tree: Tree) -> Flags:
     """(J,) segments of the trunk and the arms: all but the root and those of a leg."""
-    found = np.asarray(parents >= 0)
-    for k, parent in enumerate(parents):  # what hangs on a foot
-        found[k] &= not (k in at or parent in at)
-    for segment in at:
-        while segment >= 0:
-            found[segment] = False
-            segment = int(parents[segment])
-    return found
+    return ~_flags([*tree.roots, *tree.up(*soles), *tree.below(*soles)], tree)
 
 
-def _below_the_thighs(at: list[int], parents: npt.NDArray[np.int_]) -> Flags:
+def _below_the_thighs(soles: Collection[str], tree: Tree) -> Flags:
     """(J,) segments between a foot (included, with what hangs on it) and the thigh, which hangs on the root."""
-    found = np.zeros(len(parents), dtype=bool)
-    for segment in at:
-        while segment >= 0 and parents[segment] >= 0:
-            found[segment] = parents[parents[segment]] >= 0
-            segment = int(parents[segment])
-    for k, parent in enumerate(parents):  # parents stand before their children
-        found[k] |= parent in at and found[parent]
-    return found
+    legs = [name for name in tree.up(*soles) if len(tree.up(name)) > 2]
+    return _flags([*legs, *tree.below(*(name for name in soles if name in legs))], tree)
