@@ -24,6 +24,7 @@ from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, 
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
 from dynakin.recordings.feet.soles import Soles
 from dynakin.settings import presets
+from dynakin.tree import Tree
 from dynakin.units import GRAVITY_M_S2
 
 MASS_KG = 70.0
@@ -88,6 +89,7 @@ def person() -> Any:
         contacts={},
         unseen_kg=0.0,
         spec=SimpleNamespace(segments=segments),
+        tree=Tree.of(segments),
     )
 
 

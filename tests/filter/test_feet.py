@@ -26,6 +26,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.pressure import floor_height, foot_pressure
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
 from dynakin.settings.noise import Noise
+from dynakin.tree import Tree
 from support.core.bridge import filter_of, to_core
 from support.core.random_models import FEET, ROOT, Trial, floating_model, prior_sd, settings, trial
 from support.oracle import measurement
@@ -77,6 +78,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
     endless = np.full(layout.size, np.inf)
     initial: Any = SimpleNamespace(
         spec=spec,
+        tree=Tree.of(spec.segments),
         names=tuple(layout.names),
         dimensionless=frozenset(),
         feet={},

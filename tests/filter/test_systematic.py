@@ -36,6 +36,7 @@ from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
 from dynakin.settings.noise import Noise
 from dynakin.settings.subject import CarriedLoad
+from dynakin.tree import Tree
 from support.made_in_space import measured
 
 Array = npt.NDArray[np.float64]
@@ -123,6 +124,7 @@ def calibrated() -> Any:
         heavy=False,
         own_inertia=False,
         spec=model,
+        tree=Tree.of(model.segments),
         names=tuple(_core.Model(model).layout.names),
         x0=_core.Model(model).initial_state(),
         plan=None,

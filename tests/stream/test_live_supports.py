@@ -14,6 +14,7 @@ from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UN
 from dynakin.recordings.standing import marker_velocities
 from dynakin.settings import presets
 from dynakin.stream.feet import LiveFeet
+from dynakin.tree import Tree
 from support.made_steps import (
     FOOT_MARKERS,
     LABORATORY,
@@ -40,7 +41,7 @@ def live(made: Made) -> list[FootLoads]:
         SimpleNamespace(name=f"foot_{side}", parent="body") for side in FOOT_MARKERS
     ]
     feet_of = {side: f"foot_{side}" for side in FOOT_MARKERS}
-    initial: Any = SimpleNamespace(feet=feet_of, contacts={}, spec=spec, ground=LABORATORY)
+    initial: Any = SimpleNamespace(feet=feet_of, contacts={}, spec=spec, tree=Tree.of(spec.segments), ground=LABORATORY)
     feet = LiveFeet(initial, presets.default(), tuple(plate.name for plate in recording.plates), {})
     velocity = np.gradient(recording.markers, recording.time, axis=0)
     assert marker_velocities(recording).shape == velocity.shape

@@ -13,6 +13,7 @@ from dynakin.filter.sources import moved_segments
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
 from dynakin.results.estimate import AXES
+from dynakin.tree import Tree
 from dynakin.units import COMPONENTS
 
 
@@ -78,5 +79,4 @@ def _joints(spec: _core.ModelSpec) -> tuple[list[str], list[int], list[str]]:
         names.append(coordinates.pop() if len(coordinates) == 1 else segment.name)
     if len(set(names)) < len(names):
         names = segments
-    parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]
-    return names, parents, segments
+    return names, Tree.of(spec.segments).numbers, segments

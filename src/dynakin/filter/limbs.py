@@ -24,7 +24,7 @@ def unseen_limbs(calibrated: CalibratedModel) -> list[dict[str, float]]:
     still, of what hangs on the root the joint's moment is absent.
     """
     spec = calibrated.spec
-    parents = {segment.name: segment.parent for segment in spec.segments}
+    tree = calibrated.tree
     marked = {marker.segment for marker in spec.markers}
     members: dict[str, list[str]] = {}
     for segment in spec.segments:  # children stand after their parents
@@ -32,7 +32,7 @@ def unseen_limbs(calibrated: CalibratedModel) -> list[dict[str, float]]:
             continue
         top = next((first for first, own in members.items() if segment.parent in own), segment.name)
         members.setdefault(top, []).append(segment.name)
-    limbs = [own for top, own in members.items() if len(own) > 1 and parents.get(parents[top], "ground") != "ground"]
+    limbs = [own for top, own in members.items() if len(own) > 1 and len(tree.up(top)) > 2]
     if not limbs:
         return []
     model = _core.Model(spec)

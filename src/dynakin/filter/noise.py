@@ -118,22 +118,17 @@ def prior_factor(noise: Noise) -> float:
 def joint_groups(initial: CalibratedModel) -> dict[str, JointGroup]:
     """Coordinate -> its group, by its place between the root and the feet; empty of a model that is fixed in the
     ground."""
-    parents = {segment.name: segment.parent for segment in initial.spec.segments}
-    joints: dict[str, JointGroup] = {name: "pelvis" for name, parent in parents.items() if parent == "ground"}
+    tree = initial.tree
+    joints: dict[str, JointGroup] = dict.fromkeys(tree.roots, "pelvis")
     turning = {segment.name for segment in initial.spec.segments if segment.axes}
     order: tuple[JointGroup, ...] = ("hips", "knees")
     for foot in initial.feet.values():
-        leg = [foot]
-        while parents[leg[-1]] not in joints and parents[leg[-1]] != "ground":
-            leg.append(parents[leg[-1]])
-        moving = [name for name in reversed(leg) if name in turning]
+        moving = [name for name in reversed(tree.up(foot)) if name in turning and name not in joints]
         joints |= {name: order[k] if k < len(order) and name != foot else "feet" for k, name in enumerate(moving)}
     found: dict[str, JointGroup] = {}
     for segment in initial.spec.segments if initial.feet else ():
-        below = segment.name
-        while below not in joints and parents[below] != "ground":  # toes, patella: the group of what they hang on
-            below = parents[below]
-        group = joints.get(segment.name) or ("upper_body" if joints[below] == "pelvis" else joints[below])
+        above = joints[tree.nearest(segment.name, joints)]  # toes, patella: the group of what they hang on
+        group = joints.get(segment.name) or ("upper_body" if above == "pelvis" else above)
         for axis in segment.axes:
             found.setdefault(axis.coordinate, group)
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from itertools import takewhile
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ from dynakin.bindings import _core
 from dynakin.filter.joint_errors import floats
 from dynakin.results.measures.sources import LEAST_OF_ROOT, Hidden, in_use, out_of_sight, taken_back, too_long
 from dynakin.results.records import REFUSED
+from dynakin.tree import Tree
 
 Flags = npt.NDArray[np.bool_]
 Array = npt.NDArray[np.float64]
@@ -51,20 +52,6 @@ def root_of(spec: _core.ModelSpec) -> str:
     return next((segment.name for segment in spec.segments if floats(segment)), "")
 
 
-def next_marked(
-    parents: Sequence[int] | npt.NDArray[np.int_], marked: Sequence[bool]
-) -> tuple[list[int], list[list[int]]]:
-    """Of each segment the next one with markers that it hangs on (-1: none), and those that hang on it."""
-    above, beyond = [-1] * len(parents), list[list[int]]([] for _ in parents)
-    for k, parent in enumerate(parents):  # parents stand before their children
-        if parent >= 0:
-            above[k] = int(parent) if marked[int(parent)] else above[int(parent)]
-    for k in reversed(range(len(parents))):
-        if parents[k] >= 0:
-            beyond[int(parents[k])] += [k] if marked[k] else beyond[k]
-    return above, beyond
-
-
 class Shown:
     """Whether markers on what hangs on a segment show how it lies, where the next one that it hangs on is seen.
 
@@ -75,14 +62,12 @@ class Shown:
 
     def __init__(self, model: _core.Model) -> None:
         spec, columns = model.spec, {name: k for k, name in enumerate(model.layout.names)}
-        self._model, self._names = model, [segment.name for segment in spec.segments]
-        self._parents = [self._names.index(s.parent) if s.parent in self._names else -1 for s in spec.segments]
-        self._columns = [
-            list(dict.fromkeys(columns[a.coordinate] for a in s.axes if a.coordinate in columns)) for s in spec.segments
-        ]
-        self._owners = [self._names.index(owner) for owner in owners_of(spec)]
-        self._root = root_of(spec)
-        self._above, self._beyond = next_marked(self._parents, [k in self._owners for k in range(len(self._names))])
+        self._model, self._tree = model, Tree.of(spec.segments)
+        self._columns = {
+            s.name: list(dict.fromkeys(columns[a.coordinate] for a in s.axes if a.coordinate in columns))
+            for s in spec.segments
+        }
+        self._owners, self._root = owners_of(spec), root_of(spec)
 
     def without(self, hidden: Hidden, states: Array, used: Flags) -> Hidden:
         """Segments out of sight (T,), without the frames in which others show them.
@@ -92,17 +77,17 @@ class Shown:
         """
         found = {}
         for name, own in hidden.items():
-            k, found[name] = self._names.index(name), own.copy()
+            found[name] = own.copy()
             for t in np.flatnonzero(own) if name != self._root else ():
-                found[name][t] = not self._shows(k, states[t], used[t], {n for n, gone in hidden.items() if gone[t]})
+                found[name][t] = not self._shows(name, states[t], used[t], {n for n, gone in hidden.items() if gone[t]})
         return found
 
-    def _shows(self, k: int, state: Array, used: Flags, hidden: set[str]) -> bool:
-        above = self._above[k]
-        ends = [end for end in self._beyond[k] if self._names[end] not in hidden]
-        if not ends or (above >= 0 and self._names[above] in hidden) or not np.isfinite(state).all():
+    def _shows(self, name: str, state: Array, used: Flags, hidden: set[str]) -> bool:
+        above = self._tree.nearest(self._tree.parents[name], self._owners)
+        ends = [end for end in self._tree.next_below(name, self._owners) if end not in hidden]
+        if not ends or above in hidden or not np.isfinite(state).all():
             return False
-        own = self._between(above, k)
+        own = self._between(above, name)
         columns = list(dict.fromkeys(column for end in ends for column in self._between(above, end)))
         rows = [3 * m + axis for m, owner in enumerate(self._owners) if used[m] and owner in ends for axis in range(3)]
         J = _core.marker_jacobian(self._model, state)[np.ix_(rows, columns)]
@@ -111,13 +96,10 @@ class Shown:
         at = [columns.index(column) for column in own]
         return bool(SKIN_M * np.sqrt(variance[at].max(initial=0.0)) < SHOWN_RAD)
 
-    def _between(self, above: int, k: int) -> list[int]:
+    def _between(self, above: str, name: str) -> list[int]:
         """Columns of the coordinates of all joints by which a segment hangs on another."""
-        found: list[int] = []
-        while k not in (above, -1):
-            found += self._columns[k]
-            k = self._parents[k]
-        return found
+        joints = takewhile(lambda each: each != above, self._tree.up(name))
+        return [column for joint in joints for column in self._columns[joint]]
 
 
 class LiveSight:

@@ -152,7 +152,7 @@ def expected_loads(
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
-    pelvis = next(s.name for s in initial.spec.segments if s.parent == "ground")
+    pelvis = initial.tree.roots[0]
     return ContactLoads(
         names=(*loads.feet, *initial.contacts, RESIDUAL),
         segments=(*(initial.feet[foot] for foot in loads.feet), *initial.contacts.values(), pelvis),
@@ -282,8 +282,7 @@ class ContactPaths:
     @classmethod
     def of(cls, initial: CalibratedModel) -> ContactPaths:
         """Those of a calibrated model."""
-        root = next(s.name for s in initial.spec.segments if s.parent == "ground")
-        own = marked_segments(initial)
+        own, root = marked_segments(initial), initial.tree.roots[0]
         below = [BELOW_PELVIS_M if name == SEAT else 0.0 for name in initial.contacts]
         return cls((own[root], *(own[segment] for segment in initial.contacts.values())), (0.0, *below))
 
@@ -298,16 +297,11 @@ class ContactPaths:
 def marked_segments(initial: CalibratedModel) -> dict[str, list[int]]:
     """Segment -> numbers of its markers, those of the nearest segment towards the root that has some where it has none;
     all markers where there is no such segment."""
-    parents = {s.name: s.parent for s in initial.spec.segments}
-    segments = [marker.segment for marker in initial.spec.markers]
-
-    def of(segment: str) -> list[int]:
-        own = [k for k, name in enumerate(segments) if name == segment]
-        if own or segment not in parents:
-            return own or list(range(len(segments)))
-        return of(parents[segment])
-
-    return {name: of(name) for name in parents}
+    tree, own = initial.tree, dict[str, list[int]]()
+    for k, marker in enumerate(initial.spec.markers):
+        own.setdefault(marker.segment, []).append(k)
+    every = list(range(len(initial.spec.markers)))
+    return {name: own.get(tree.nearest(name, own), every) for name in tree.parents}
 
 
 def _middle(places: Array) -> Array:

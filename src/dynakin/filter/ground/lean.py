@@ -44,7 +44,7 @@ BESIDE_M = 0.03
 def root_path(initial: CalibratedModel, markers: Array) -> Array:
     """(T, 3) m, ground frame: mean of the markers (T, M, 3) on the pelvis; NaN where one of them is missing that most
     frames show, and throughout where they show one side of it alone."""
-    roots = {segment.name for segment in initial.spec.segments if segment.parent == "ground"}
+    roots = initial.tree.roots
     on_root = [k for k, marker in enumerate(initial.spec.markers) if marker.segment in roots]
     own, places = markers[:, on_root], np.array([initial.spec.markers[k].position for k in on_root]).reshape(-1, 3)
     often = np.isfinite(own).all(axis=2).mean(axis=0) > 0.5

@@ -135,7 +135,8 @@ class CentreWeights:
         turns = np.array([kinds.get(name) == "rotation" for name in free])
         spread = np.random.default_rng(0).normal(0.0, _SPREAD_RAD, (_POSTURES, size)) * turns
         if initial.unseen_kg:
-            root = {a.coordinate for s in initial.spec.segments if s.parent == "ground" for a in s.axes}
+            roots = initial.tree.roots
+            root = {a.coordinate for s in initial.spec.segments if s.name in roots for a in s.axes}
             spread *= np.where(np.isin(free, list(root)), _UNSEEN_RAD / _SPREAD_RAD, 1.0)
         states[:, offset : offset + size] += spread
         axes = np.array(initial.spec.markers[0].measured)
