@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.report.styles import SIDE_COLOURS, segment_colours, side_of
-from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate, tree_of
 from dynakin.results.naming import words
 
 
@@ -61,17 +61,16 @@ def chain_of(estimate: Estimate) -> Chain:
     """
     if "joint_centres" not in estimate.data:
         return Chain(np.zeros((len(estimate.time), 0, 3)), ())
-    data = estimate.data
     points = [*np.moveaxis(estimate.values("joint_centres"), 1, 0)]
-    parents = [int(parent) for parent in data["joint_parent"].values]
-    segments = [str(name) for name in data["joint_segment"].values]
-    bones = [Bone(p, j, segments[p]) for j, p in enumerate(parents) if p >= 0]
+    tree = tree_of(estimate.data)
+    hung = zip(tree.numbers, tree.parents.values(), strict=True)
+    bones = [Bone(p, j, parent) for j, (p, parent) in enumerate(hung) if p >= 0]
     markers = np.where(estimate.modelled_axes(), estimate.values("markers_estimated"), 0.0)
     known = ~estimate.lost  # the others are empty
     carriers = estimate.marker_segments
-    for joint, segment in enumerate(segments):
+    for joint, segment in enumerate(tree.parents):
         own = [k for k, name in enumerate(estimate.marker_names) if carriers.get(name) == segment]
-        if joint in parents or not own:
+        if segment not in tree.ends or not own:
             continue
         far = np.linalg.norm(markers[known][:, own] - points[joint][known, None], axis=2).sum(axis=0)
         bones.append(Bone(joint, len(points), segment))

@@ -122,16 +122,11 @@ def figures_in_space(
 
 def left_out_groups(calibrated: CalibratedModel) -> list[list[int]]:
     """The model's markers (numbers) in groups, as few as come of it, none with two on one segment or on neighbours."""
-    parents = {segment.name: segment.parent for segment in calibrated.spec.segments}
-    segments = [marker.segment for marker in calibrated.spec.markers]
-
-    def near(a: str, b: str) -> bool:
-        return a == b or parents[a] == b or parents[b] == a
-
+    tree, segments = calibrated.tree, [marker.segment for marker in calibrated.spec.markers]
     groups: list[list[int]] = []
     for k, segment in enumerate(segments):
         for group in groups:
-            if not any(near(segment, segments[j]) for j in group):
+            if not any(segment == segments[j] or tree.adjacent(segment, segments[j]) for j in group):
                 group.append(k)
                 break
         else:

@@ -9,6 +9,7 @@ from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.identification.observability.gauges import ZERO, Gauge
 from dynakin.results.naming import listed, number, plural, words
+from dynakin.tree import Tree
 from dynakin.validation.reference.base_parameters import BaseParameters
 
 INERTIA = {
@@ -42,15 +43,12 @@ def base_words(base: BaseParameters, spec: _core.ModelSpec) -> list[str]:
     """Each base parameter as the sum that it is; numbers with the same factor are put together, and all that a segment
     carries is called that."""
     planar = is_planar(base.over)
-    children: dict[str, list[str]] = {segment.name: [] for segment in spec.segments}
-    for entry in spec.segments:
-        if entry.parent in children:
-            children[entry.parent].append(entry.name)
+    tree = Tree.of(spec.segments)
     massive = {element(name).owner for name in base.over if name.endswith("/mass")}
     said = []
     for name, row in zip(base.names, base.K, strict=True):
         head = inertia_words(name, planar=planar)
-        carried = _carried(element(name).owner, children) & massive
+        carried = massive.intersection(tree.below(element(name).owner))
         terms: dict[tuple[str, float], list[str]] = {}
         for factor, other in zip(row, base.over, strict=True):
             if other != name and abs(factor) > 1e-6:
@@ -76,13 +74,6 @@ def _unit(head: str, kind: str) -> str:
     return {1: "m", 2: "m²"}.get(power, "")
 
 
-def _carried(segment: str, children: dict[str, list[str]]) -> set[str]:
-    found: set[str] = set()
-    for child in children.get(segment, []):
-        found |= {child} | _carried(child, children)
-    return found
-
-
 def gauges_in_words(gauges: tuple[Gauge, ...], spec: _core.ModelSpec) -> list[str]:
     """A sentence a gauge, or for all that are said alike; the displacements of skin, each marker's own, in one."""
     skin = [gauge for gauge in gauges if _is_skin(gauge)]
@@ -103,7 +94,7 @@ def gauge_in_words(gauge: Gauge, spec: _core.ModelSpec) -> str:
     """What moves against what, unseen."""
     names = list(gauge.direction)
     joints = {segment.name: _joint(segment) for segment in spec.segments}
-    parents = {segment.name: segment.parent for segment in spec.segments}
+    tree = Tree.of(spec.segments)
     homes = {marker.name: marker.segment for marker in spec.markers}
     zeros = [name.removeprefix(ZERO) for name in names if name.startswith(ZERO)]
     masses = {element(name).owner: gauge.direction[name] for name in names if name.endswith("/mass")}
@@ -115,10 +106,8 @@ def gauge_in_words(gauge: Gauge, spec: _core.ModelSpec) -> str:
         return f"{marker}: the mean displacement of the skin under it against its place on the {words(homes[marker])}"
     if all(name.startswith("inertia/") for name in names):
         if len(masses) == 2:
-            one, other = masses
-            if parents[one] == other:
-                one, other = other, one
-            if parents[other] == one and abs(masses[one] + masses[other]) < 1e-6 * abs(masses[one]):
+            one, other = sorted(masses, key=list(tree.parents).index)  # parents before their children
+            if tree.adjacent(one, other) and abs(masses[one] + masses[other]) < 1e-6 * abs(masses[one]):
                 return f"{joints[other]}: a mass at it may belong to the {words(one)} or to the {words(other)}"
         if len(segments) == 1:
             numbers = listed([INERTIA[name.rpartition("/")[2]] for name in names], 10)

@@ -91,15 +91,10 @@ class Bench:
         self.limits = (initial.lower[at[0]], initial.upper[at[0]])
         rotations = {name for name, kind in zip(estimate.coordinate_names, estimate.is_rotation(), strict=True) if kind}
         self.rotation = [name in rotations for name in self.coordinates]
-        spec = initial.spec
-        parents = {segment.name: segment.parent for segment in spec.segments}
-        self.standing = set(initial.feet.values()) or {name for name, parent in parents.items() if parent == "ground"}
-        held = set(self.standing)  # what would move the feet: all between them and the root, and toes
-        for foot in self.standing:
-            while (foot := parents[foot]) != "ground":
-                held.add(foot)
-        held |= {name for name, parent in parents.items() if initial.feet and parent in self.standing}
-        self.grounded = {axis.coordinate for s in spec.segments if s.name in held for axis in s.axes}
+        tree, feet = initial.tree, initial.feet.values()
+        self.standing = set(feet) or set(tree.roots)
+        held = {*tree.up(*self.standing), *tree.below(*feet)}  # what would move the feet: all up to the root; and toes
+        self.grounded = {axis.coordinate for s in initial.spec.segments if s.name in held for axis in s.axes}
         self.support = self._support()
         self.least_load = _LIGHTEST * abs(float(self.loads(self.trial)[0].mean()))
 

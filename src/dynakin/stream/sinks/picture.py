@@ -17,6 +17,7 @@ from dynakin.model.schema import kinds_of
 from dynakin.recordings.plates.ground_plate import level_pressure
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.stream.sinks.base import LiveFrame, Started, Status
+from dynakin.tree import Tree
 
 Array = npt.NDArray[np.float64]
 
@@ -35,20 +36,18 @@ class Picture:
 
     def __init__(self, started: Started, plates: int) -> None:
         self.initial, self.model = started.initial, started.model
-        spec = self.initial.spec
-        segments = [segment.name for segment in spec.segments]
+        spec, tree = self.initial.spec, self.initial.tree
         elements = [element(name) for name in self.initial.names]
         self._constants = [k for k, e in enumerate(elements) if e.kind == "length" or e[::2] == ("inertia", "mass")]
-        markers, axes = 3 * len(spec.markers), len(spec.coordinates)
-        sizes = (1, 3 * len(segments), markers, markers, 6 * (plates + 1), axes, axes, axes, axes, len(self._constants))
+        joints, markers, axes = 3 * len(spec.segments), 3 * len(spec.markers), len(spec.coordinates)
+        sizes = (1, joints, markers, markers, 6 * (plates + 1), axes, axes, axes, axes, len(self._constants))
         self.sizes = dict(zip(BLOCKS, sizes, strict=True))
         self._moment_sd = np.full(len(spec.coordinates), np.nan)
-        parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]
         self.setup: dict[str, Any] = {
             "model": spec.name,
             "sizes": self.sizes,
-            "bones": [[parents[j], j] for j in range(len(segments)) if parents[j] >= 0],
-            "ends": self._ends(segments, parents),
+            "bones": [[parent, j] for j, parent in enumerate(tree.numbers) if parent >= 0],
+            "ends": self._ends(tree),
             "coordinates": [c.name for c in spec.coordinates],
             "rotation": rotations(spec),
             "locked": [c.locked for c in spec.coordinates],
@@ -83,14 +82,14 @@ class Picture:
         )
         return np.concatenate([np.ravel(part) for part in parts])
 
-    def _ends(self, segments: list[str], parents: list[int]) -> list[list[int]]:
+    def _ends(self, tree: Tree) -> list[list[int]]:
         """(joint, marker): a segment without a further joint is drawn to its farthest marker."""
         centres = _core.whole_body(self.model, np.ascontiguousarray(self.initial.x0[None]))["joint_centres"][0]
         places = _core.marker_positions(self.model, np.ascontiguousarray(self.initial.x0))
         found = []
-        for joint, segment in enumerate(segments):
+        for joint, segment in enumerate(tree.parents):
             own = [k for k, marker in enumerate(self.initial.spec.markers) if marker.segment == segment]
-            if joint not in parents and own:
+            if segment in tree.ends and own:
                 far = np.linalg.norm(places[own] - centres[joint], axis=1)
                 found.append([joint, own[int(np.argmax(far))]])
         return found
