@@ -13,6 +13,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure, starting_state
+from dynakin.model.calibration.how import AUTO, Calibration
 from dynakin.model.calibration.pose_start import start_posture
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.opensim.calibrate import (
@@ -33,9 +34,8 @@ from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import coupled_of, in_radians, independent_coordinates, moved_by, to_spec, unseen
 from dynakin.model.schema import kinds_of
 from dynakin.model.state_priors import places_prior, state_bounds, state_prior
-from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
-from dynakin.settings.model import Bounds, OpenSimOptions, Priors
+from dynakin.settings.model import OpenSimOptions
 from dynakin.settings.strict import nearest, validate
 from dynakin.settings.subject import Subject
 from dynakin.units import gravity_problem
@@ -100,18 +100,9 @@ class OpenSimDefinition:
         return self.name, expected, found, "expected half of them" if 2 * len(found) < len(expected) else ""
 
     def calibrate(
-        self,
-        recording: Recording,
-        *,
-        static: Recording | None = None,
-        side: str = "auto",
-        vertical: str = "auto",
-        forward: str | tuple[float, float, float] = "auto",
-        priors: Priors | None = None,
-        bounds: Bounds | None = None,
-        ground: GroundFrame | None = None,
+        self, recording: Recording, *, static: Recording | None = None, how: Calibration = AUTO
     ) -> CalibratedModel:
-        """As ``Definition.calibrate``; ``side`` does not matter, for the file says where its markers are. The ground is
+        """As ``Definition.calibrate``; the side does not matter, for the file says where its markers are. The ground is
         the laboratory, Y up; X is forward where it is asked for, or where the file holds the body so that it cannot
         head anywhere."""
         source, options, messages = (
@@ -119,12 +110,11 @@ class OpenSimDefinition:
             self.options,
             [note("calibration", text) for text in self.source.left_out],
         )
-        find = find_laboratory_frame if source.floating else find_ground_frame
         chosen, measured_by = sites(source, options.leave_out, recording)
         feet, found_by = feet_of(source, {str(side): body for side, body in options.feet.items()})
         on_feet = foot_markers(source, chosen, feet)
         pairs = facing_pairs(source, chosen, feet)
-        frame = ground or find(recording, vertical=vertical, forward=forward, pairs=pairs, static=static)
+        frame = how.ground or how.find_ground(recording, pairs, static, floating=self.floating)
         messages += [note("ground", text) for text in frame.how]
         if options.scale_masses:
             source = of_subject(
@@ -193,12 +183,12 @@ class OpenSimDefinition:
             f"inertia/{s.name}/{k}": v for s in spec.segments for k, v in zip(INERTIA_NAMES, s.inertia, strict=True)
         }
         skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
-        kinds, known = kinds_of(spec.segments), priors or Priors()
-        known = known.changed(marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
+        kinds = kinds_of(spec.segments)
+        known = how.priors.changed(marker_sd_m=float(np.hypot(how.priors.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
         together = places_prior(places, {marker.name: marker.body for marker, _ in chosen}, known)
         state, said = starting_state(
             spec,
-            bounds=state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds(), {}),
+            bounds=state_bounds(limits, lengths, {}, places, bodies, reach, how.bounds, {}),
             prior=state_prior(kinds, lengths, {}, places, bodies, reach, known, {}) | together.sd,
             table=table,
             speeds={},
