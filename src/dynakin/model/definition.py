@@ -220,11 +220,7 @@ class ModelDefinition:
             unmarked_kg=unmarked_kg,
             held=held,
             joint_prior=plan.joint_prior(how.priors),
-            guessed_places=bool(rest.trial.match.guessed),
-            unmarked_joints=rest.unmarked_joints,
-            one_sided_joints=rest.one_sided_joints,
-            moved_joints=rest.moved_joints,
-            hips=rest.hips,
+            provenance=rest.provenance,
         )
 
 

@@ -75,6 +75,28 @@ class Coupled:
         return np.asarray(places[:, [model.segment_names.index(name) for name in self.kinds], 0])
 
 
+@dataclass(frozen=True)
+class Provenance:
+    """Where the places of markers and joints come from, as far as it makes them less sure.
+
+    Attributes:
+        guessed_places: whether the places of the markers were guessed, because no marker set has their names.
+        unmarked_joints: knees and ankles that no marker shows, where the movement (`legs_in_motion`) or proportions
+            have them.
+        one_sided_joints: knees and ankles with a lateral marker alone and no measured width: their centres lie half an
+            adult's joint width inwards.
+        moved_joints: knees and ankles whose markers sit otherwise in the standing trial than in the trial.
+        hips: where their centres come from: markers of the pelvis; supposed, where some of these are put where two
+            others or the other side have them, or sit otherwise in the trial; or proportions of an adult.
+    """
+
+    guessed_places: bool = False
+    unmarked_joints: tuple[str, ...] = ()
+    one_sided_joints: tuple[str, ...] = ()
+    moved_joints: tuple[str, ...] = ()
+    hips: Hips = "measured"
+
+
 @dataclass(frozen=True, eq=False)
 class CalibratedModel(StartingState):
     """A model calibrated on one person, and the state from which the filter starts.
@@ -104,14 +126,7 @@ class CalibratedModel(StartingState):
         own_inertia: whether inertia was identified of this person, and is not the table's.
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
         held: coordinate -> why nothing shows it, where it is held at an angle for lack of markers: results have none.
-        guessed_places: whether the places of the markers were guessed, because no marker set has their names.
-        unmarked_joints: knees and ankles that no marker shows, where the movement (`legs_in_motion`) or proportions
-            have them.
-        one_sided_joints: knees and ankles with a lateral marker alone: their centres lie half an adult's joint width
-            inwards.
-        moved_joints: knees and ankles whose markers sit otherwise in the standing trial than in the trial.
-        hips: where their centres come from: markers of the pelvis; supposed, where some of these are put where two
-            others or the other side have them, or sit otherwise in the trial; or proportions of an adult.
+        provenance: where places of markers and joints come from.
         joint_prior: how elements hang together at first; the others are independent.
         coupled: coordinates of an OpenSim model that follow others, and are none of ``spec``.
         in_radians: rotations, of ``coupled`` too, that OpenSim takes from a table in degrees as radians all the same.
@@ -139,11 +154,7 @@ class CalibratedModel(StartingState):
     own_inertia: bool = False
     unmarked_kg: float = 0.0
     held: dict[str, str] = field(default_factory=dict)
-    guessed_places: bool = False
-    unmarked_joints: tuple[str, ...] = ()
-    one_sided_joints: tuple[str, ...] = ()
-    moved_joints: tuple[str, ...] = ()
-    hips: Hips = "measured"
+    provenance: Provenance = Provenance()
     joint_prior: JointPrior | None = None
     contacts: dict[str, str] = field(default_factory=dict)
     coupled: Coupled | None = None

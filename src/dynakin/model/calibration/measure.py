@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.body import check_body_mass, doubtful_height, find_height, find_mass, joint_widths
-from dynakin.model.calibration.calibrated import Hips
+from dynakin.model.calibration.calibrated import Provenance
 from dynakin.model.calibration.checks import (
     check_masses,
     check_standing,
@@ -98,10 +98,7 @@ class Measured:
     trial: MarkedTrial
     unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
     held: dict[str, str]  # coordinate -> why nothing shows it
-    unmarked_joints: tuple[str, ...]  # knees and ankles that no marker shows
-    one_sided_joints: tuple[str, ...]  # those with a lateral marker alone and no measured width
-    moved_joints: tuple[str, ...]  # knees and ankles whose markers sit otherwise in the standing trial
-    hips: Hips  # where their centres come from
+    provenance: Provenance
     still: bool  # the person stands still in the calibration frames
 
 
@@ -216,10 +213,13 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
         trial=trial,
         unplaced=tuple(c for c in marked.chosen if c.recorded not in placed_names),
         held={name: f"segment {segment} has no markers" for segment, names in marked.bare.items() for name in names},
-        unmarked_joints=unmarked,
-        one_sided_joints=tuple(n for n in LEG_JOINTS if n in finder.usual_widths - {*(asked.functional or ())}),
-        hips=trials.pelvis.hips(finder, found.added, asked.functional or (), trials.moved.hips(finder)),
-        moved_joints=trials.moved.joints(finder),
+        provenance=Provenance(
+            guessed_places=bool(trial.match.guessed),
+            unmarked_joints=unmarked,
+            one_sided_joints=tuple(n for n in LEG_JOINTS if n in finder.usual_widths - {*(asked.functional or ())}),
+            moved_joints=trials.moved.joints(finder),
+            hips=trials.pelvis.hips(finder, found.added, asked.functional or (), trials.moved.hips(finder)),
+        ),
         still=still.stands,
     )
 
