@@ -215,7 +215,7 @@ class ModelDefinition:
             parts=rest.parts,
             messages=tuple(messages),
             plan=plan,
-            foot_markers=rest.trial.match.foot_markers,
+            markers_of_fixed_feet={} if plan.model.feet else rest.trial.match.foot_markers,
             feet=plan.model.feet,
             unmarked_kg=unmarked_kg,
             held=held,

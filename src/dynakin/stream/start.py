@@ -196,7 +196,7 @@ def check_loaded(estimator: Estimator, initial: CalibratedModel, recording: Reco
         RecordingError: they cannot be meant so.
     """
     declared_kg = None if initial.feet else initial.weighed_kg
-    check = check_plates(recording, initial.ground, declared_kg, initial.markers_on_feet)
+    check = check_plates(recording, initial.ground, declared_kg, initial.foot_markers)
     if check.refusal:
         raise RecordingError(f"plates: {check.refusal}")
     weighed = check.mass_kg_from_plates is not None

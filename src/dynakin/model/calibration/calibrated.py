@@ -116,7 +116,8 @@ class CalibratedModel(StartingState):
         plan: the same as plain data; None for an OpenSim model.
         feet: "right", "left" -> segment on which the ground acts; empty for a model fixed in the ground.
         contacts: name -> segment, of the contacts that are declared in addition to the feet (a seat, hands on a rail).
-        foot_markers: "right", "left" -> the recording's names of the markers on that foot.
+        markers_of_fixed_feet: of a model fixed in the ground: "right", "left" -> the recording's names of the markers
+            on that foot, whichever of them are sites.
         unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
             added to the noise of the cameras.
         skin_lasts: how many times longer skin stays displaced than the noise settings say of a floating model.
@@ -145,7 +146,7 @@ class CalibratedModel(StartingState):
     messages: tuple[Message, ...]
     plan: ModelPlan | None
     feet: dict[str, str] = field(default_factory=dict)
-    foot_markers: dict[str, list[str]] = field(default_factory=dict)
+    markers_of_fixed_feet: dict[str, list[str]] = field(default_factory=dict)
     unmodelled_m: Array | float = 0.0
     skin_lasts: float = 1.0
     dimensionless: frozenset[str] = frozenset()
@@ -203,11 +204,11 @@ class CalibratedModel(StartingState):
         return {side: name for side, name in self.feet.items() if shown[name] < least}
 
     @property
-    def markers_on_feet(self) -> dict[str, list[str]]:
+    def foot_markers(self) -> dict[str, list[str]]:
         """Foot -> the recording's names of the markers on its segment, and on those that hang on that (toes); none of
-        `unmarked_feet`. Of a model fixed in the ground: ``foot_markers``."""
+        `unmarked_feet`."""
         if not self.feet:
-            return self.foot_markers
+            return self.markers_of_fixed_feet
         parents = {segment.name: segment.parent for segment in self.spec.segments}
 
         def on(segment: str, foot: str) -> bool:

@@ -209,7 +209,6 @@ class OpenSimDefinition:
             messages=tuple(messages),
             plan=None,
             feet=feet,
-            foot_markers=on_feet,
             unmodelled_m=np.full(len(skin), _MODEL_M),
             skin_lasts=_SKIN_LASTS,
             dimensionless=frozenset(lengths),
