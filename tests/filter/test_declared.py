@@ -123,7 +123,7 @@ def test_a_plate_under_the_seat_measures_it() -> None:
 def closure_of(recording: dynakin.Recording, model: dynakin.ModelDefinition) -> Closure:
     initial = dynakin.Estimator(model).calibrate(recording)
     markers, wrench = recording_arrays(recording, initial, gaps=True)
-    loads = foot_loads(recording, initial.ground, initial.markers_on_feet)
+    loads = foot_loads(recording, initial.ground, initial.foot_markers)
     found = closure(initial, recording.time, markers, wrench, loads.total_known)
     assert found is not None
     return found

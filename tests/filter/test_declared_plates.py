@@ -33,7 +33,7 @@ def by_hands() -> tuple[Recording, dynakin.CalibratedModel, np.ndarray, FootLoad
     squat = simulate("fullbody", "squat", 3, 6.0, 50.0, 70.0, 1.75, "male").recording
     initial = dynakin.Estimator(person(), contacts=HANDS).calibrate(squat)
     markers, _ = recording_arrays(squat, initial, gaps=True)
-    loads = foot_loads(squat, initial.ground, initial.markers_on_feet, others=HANDS)
+    loads = foot_loads(squat, initial.ground, initial.foot_markers, others=HANDS)
     return squat, initial, ContactPaths.of(initial).at(markers), loads
 
 
@@ -78,7 +78,7 @@ def test_two_contacts_on_one_plate_share_it(given: dict[str, str] | None) -> Non
 def test_a_shared_plate_measures_the_sum_of_what_is_on_it() -> None:
     squat, initial, paths, _ = by_hands()
     recording = squat.with_plates((*squat.plates, pressed("a", paths[:, 1:].mean(axis=1))))
-    loads = foot_loads(recording, initial.ground, initial.markers_on_feet, others=HANDS, given={"a": HANDS})
+    loads = foot_loads(recording, initial.ground, initial.foot_markers, others=HANDS, given={"a": HANDS})
     assert loads.total_known.all() and loads.sharing == [HANDS]
     nothing = np.zeros(len(paths), dtype=bool)
     bears = np.zeros((len(paths), 2), dtype=bool)

@@ -16,6 +16,7 @@ from dynakin.errors import ModelError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.core_filter import smoothed
+from dynakin.model.calibration.calibrated import Provenance
 from dynakin.pipeline.result import Result
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.formats.mot import read_table
@@ -84,11 +85,10 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
         feet={},
         contacts={},
         held={},
-        unmarked_joints=(),
+        provenance=Provenance(),
         unmarked_feet={},
         coupled=None,
         in_radians=frozenset(),
-        guessed_places=False,
         soft_tissue_m=np.zeros(len(SPEC.markers)),
         x0=data.x0,
         sd0=prior_sd(layout),

@@ -93,7 +93,7 @@ def test_without_plates_nothing_is_the_feets_alone_where_they_are_not_under_the_
     recording = simulate("fullbody", "squat", 11, 12.0).recording
     estimator = person("fullbody")
     initial = estimator.start(recording).calibrated
-    feet = [recording.marker_names.index(name) for own in initial.markers_on_feet.values() for name in own]
+    feet = [recording.marker_names.index(name) for own in initial.foot_markers.values() for name in own]
     markers = recording.markers.copy()
     markers[:, feet] += np.array([away_m, 0.0, 0.0])
     _, _, ground = estimator._measured(replace(recording.with_plates(()), markers=markers), initial)

@@ -29,6 +29,7 @@ from dynakin.filter.reported_sd import (
     reported,
 )
 from dynakin.filter.systematic import _STEP_S, ROOT_SKIN, Systematic
+from dynakin.model.calibration.calibrated import Provenance
 from dynakin.model.calibration.declared import with_loads
 from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
 from dynakin.model.state_priors import COMMON_SKIN
@@ -117,10 +118,7 @@ def changed(**errors: Array) -> _core.Model:
 def calibrated() -> Any:
     model = spec()
     return SimpleNamespace(
-        unmarked_joints=(),
-        one_sided_joints=(),
-        moved_joints=(),
-        hips="measured",
+        provenance=Provenance(),
         heavy=False,
         own_inertia=False,
         spec=model,

@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
+from dynakin.model.calibration.how import Calibration
 from dynakin.model.definition import load_model
 from dynakin.recordings.recording import Recording
 from dynakin.settings.subject import Subject
@@ -43,7 +44,7 @@ def test_sagittal7_has_89_states_that_are_all_set(standing_person: Recording) ->
 
 @pytest.mark.parametrize("name", ["sagittal7", "squat7"])
 def test_the_core_puts_the_markers_where_they_were_measured(name: str, standing_person: Recording) -> None:
-    initial = load_model(name, PERSON).calibrate(standing_person, side="right")
+    initial = load_model(name, PERSON).calibrate(standing_person, how=Calibration(side="right"))
     model = _core.Model(initial.spec)
     places = np.asarray(_core.marker_positions(model, initial.x0))
     measured = np.array([standing_person.marker(marker)[0] for marker in initial.recorded_markers])

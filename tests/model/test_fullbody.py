@@ -11,6 +11,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.error_sizes import LANDMARKS, ONE_SIDED, SINCE_CENTRE, less_sure_joints
 from dynakin.filter.estimator import Estimator
+from dynakin.model.calibration.how import Calibration
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.contact import SHARED_PLATE
 from dynakin.recordings.frame import GroundFrame
@@ -99,7 +100,7 @@ def test_starts_at_any_heading_in_any_pose(seed: int) -> None:
     }
     x = states(initial, pose, rng.uniform(-np.pi, np.pi), rng.uniform(-3, 3, 3), time)
     trial = recording_of(initial, x, time, plates=False, noise_m=0.001)
-    found = definition().calibrate(trial, ground=LABORATORY, static=standing())
+    found = definition().calibrate(trial, static=standing(), how=Calibration(ground=LABORATORY))
     n = len([c for c in found.spec.coordinates if not c.locked])
     names = list(found.names)
     turned = [k for k in range(n) if not names[k].startswith("pelvis_t") or names[k] == "pelvis_tilt"]
@@ -124,7 +125,7 @@ def test_skin_that_never_comes_back_to_where_it_was_measured_leaves_places_less_
 
     def since(frames: slice) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
         trial = recording_of(initial, x[frames], time[frames], plates=False, noise_m=0.0005)
-        found = definition().calibrate(trial, ground=LABORATORY, static=standing())
+        found = definition().calibrate(trial, static=standing(), how=Calibration(ground=LABORATORY))
         sd = dict(zip(found.names, found.sd0.tolist(), strict=True))
         sites = found.measured_plan().sites
         centres = less_sure_joints(found)
@@ -207,7 +208,9 @@ def test_a_movement_that_never_shows_most_markers_at_once_is_refused() -> None:
     markers = whole.markers.copy()
     markers[::2, ::2], markers[1::2, 1::2] = np.nan, np.nan  # each frame shows the other half
     with pytest.raises(ModelError, match=r"no frame shows \d+ % of the \d+ markers"):
-        definition().calibrate(replace(whole, markers=markers), static=whole, vertical="+Y", forward=(1.0, 0.0, 0.0))
+        definition().calibrate(
+            replace(whole, markers=markers), static=whole, how=Calibration(vertical="+Y", forward=(1.0, 0.0, 0.0))
+        )
 
 
 def test_a_limb_written_once_has_two_sides() -> None:
@@ -225,7 +228,7 @@ def test_a_recording_in_which_sides_are_swapped_is_refused() -> None:
     names = tuple(other[n[0]] + n[1:] if n[0] in other else n for n in whole.marker_names)
     swapped = Recording("swapped", None, whole.time, names, whole.markers)
     with pytest.raises(ModelError, match="swapped"):
-        definition().calibrate(swapped, ground=LABORATORY, static=whole)
+        definition().calibrate(swapped, static=whole, how=Calibration(ground=LABORATORY))
 
 
 def test_both_tables_have_the_trunk_and_head_before_the_spine() -> None:

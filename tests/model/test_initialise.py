@@ -11,6 +11,7 @@ import pytest
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height
 from dynakin.model.calibration.frames import MarkedTrial
+from dynakin.model.calibration.how import Calibration
 from dynakin.model.definition import load_model
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
@@ -83,13 +84,13 @@ def test_side_auto_takes_the_side_with_fewer_gaps(standing_person: Recording) ->
     plan = found.measured_plan()
     assert found.side == "left"
     assert plan.sites[0].recorded == "L_toe"
-    assert definition.calibrate(gap, side="right").side == "right"
+    assert definition.calibrate(gap, how=Calibration(side="right")).side == "right"
     with pytest.raises(ModelError, match="side is 'middle', expected auto, right, left or both"):
-        definition.calibrate(gap, side="middle")
+        definition.calibrate(gap, how=Calibration(side="middle"))
 
 
 def test_both_sides_are_separate_sites(standing_person: Recording) -> None:
-    plan = load_model("sagittal7", PERSON).calibrate(standing_person, side="both").measured_plan()
+    plan = load_model("sagittal7", PERSON).calibrate(standing_person, how=Calibration(side="both")).measured_plan()
     assert len(plan.sites) == 33  # 16 a side and C7
     assert np.rad2deg(plan.start["knee"]) == pytest.approx(8.0, abs=1e-6)
 
@@ -217,7 +218,7 @@ def test_a_height_that_is_none_of_that_mass_is_refused(standing_person: Recordin
 def test_one_frame_is_enough() -> None:
     plan = (
         load_model("sagittal7", PERSON, "opencap")
-        .calibrate(make([stand()]), forward="+X", vertical="+Y")
+        .calibrate(make([stand()]), how=Calibration(forward="+X", vertical="+Y"))
         .measured_plan()
     )
     assert np.rad2deg(plan.start["ankle"]) == pytest.approx(5.0, abs=1e-6)
@@ -306,7 +307,7 @@ def test_a_users_own_spatial_tree(tmp_path: Path, standing_person: Recording) ->
     (tmp_path / "set.toml").write_text(text, encoding="utf-8")
     definition = load_model(tmp_path / "leg.toml", PERSON, tmp_path / "set.toml")
     for side, sign in (("right", 1.0), ("left", -1.0)):
-        found = definition.calibrate(standing_person, side=side)
+        found = definition.calibrate(standing_person, how=Calibration(side=side))
         plan = found.measured_plan()
         letter = side[0].upper()
         hip, knee, ankle = (

@@ -152,8 +152,8 @@ def test_a_joint_with_a_lateral_marker_alone_is_less_sure() -> None:
     assert len(kept) == len(whole.marker_names) - 4
     half = replace(whole, marker_names=tuple(whole.marker_names[k] for k in kept), markers=whole.markers[:, kept])
     both, one = (dynakin.Estimator(load_model("fullbody", subject=WHO)).calibrate(each) for each in (whole, half))
-    assert both.one_sided_joints == () and less_sure_joints(both) == {}
-    assert set(one.one_sided_joints) == {*JOINTS}
+    assert both.provenance.one_sided_joints == () and less_sure_joints(both) == {}
+    assert set(one.provenance.one_sided_joints) == {*JOINTS}
     legs = ("shank_r", "shank_l", "foot_r", "foot_l")
     assert less_sure_joints(one) == dict.fromkeys(legs, ONE_SIDED)
     assert both.plan is not None and one.plan is not None

@@ -11,6 +11,7 @@ import pytest
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.calibration.how import Calibration
 from dynakin.model.calibration.lumping import part_length
 from dynakin.model.definition import load_model
 from dynakin.model.inertia import RigidBody
@@ -41,7 +42,7 @@ def planar_sum(points: Array, masses: Array) -> Array:
 @pytest.fixture(params=[("sagittal7", "dumas"), ("squat7", "dumas"), ("sagittal7", "deleva"), ("squat7", "deleva")])
 def measured(request: pytest.FixtureRequest, standing_person: Recording) -> tuple[ModelPlan, CalibratedModel, str]:
     model, table = request.param
-    found = load_model(model, PERSON, "opencap", table).calibrate(standing_person, side="right")
+    found = load_model(model, PERSON, "opencap", table).calibrate(standing_person, how=Calibration(side="right"))
     return found.measured_plan(), found, table
 
 
@@ -80,7 +81,7 @@ def test_each_segment_equals_the_points_of_its_parts_on_both_sides(
 def test_the_whole_body_is_where_the_parts_are(standing_person: Recording) -> None:
     """The centre of mass of the chain equals the one of the parts placed at the landmarks, in the ground
     frame."""
-    found = load_model("sagittal7", PERSON, "opencap").calibrate(standing_person, side="right")
+    found = load_model("sagittal7", PERSON, "opencap").calibrate(standing_person, how=Calibration(side="right"))
     plan = found.measured_plan()
     height = sum(
         body.mass * (plan_pose(plan, name) @ [*body.centre[:2], 1.0])[1] for name, body in plan.inertia.items()
@@ -107,7 +108,7 @@ def plan_pose(plan: ModelPlan, name: str) -> Array:
 
 
 def test_foot_frame_is_turned_from_heel_to_metatarsals(standing_person: Recording) -> None:
-    found = load_model("sagittal7", PERSON, "opencap").calibrate(standing_person, side="right")
+    found = load_model("sagittal7", PERSON, "opencap").calibrate(standing_person, how=Calibration(side="right"))
     foot = found.parts["foot"][0]
     heel, middle = np.array([-0.21, -0.01]), 0.5 * np.array([-0.03, -0.02])
     direction = (middle - heel) / np.linalg.norm(middle - heel)
@@ -117,7 +118,11 @@ def test_foot_frame_is_turned_from_heel_to_metatarsals(standing_person: Recordin
 
 def test_proximal_table_origin_goes_to_the_distal_joint(standing_person: Recording) -> None:
     """A shank of the table hangs from the knee; in the toe-rooted chain its origin is the ankle."""
-    plan = load_model("sagittal7", PERSON, "opencap").calibrate(standing_person, side="right").measured_plan()
+    plan = (
+        load_model("sagittal7", PERSON, "opencap")
+        .calibrate(standing_person, how=Calibration(side="right"))
+        .measured_plan()
+    )
     body, entry = plan.inertia["shank"], load_table("dumas", "female").part("shank")
     length = plan.geometry.lengths["shank"]
     np.testing.assert_allclose(body.centre[:2], [entry.centre[0] * length, (1.0 + entry.centre[1]) * length])
@@ -126,7 +131,7 @@ def test_proximal_table_origin_goes_to_the_distal_joint(standing_person: Recordi
 
 
 def test_a_straight_arm_is_laid_part_after_part(standing_person: Recording) -> None:
-    found = load_model("squat7", PERSON, "opencap").calibrate(standing_person, side="right")
+    found = load_model("squat7", PERSON, "opencap").calibrate(standing_person, how=Calibration(side="right"))
     upper, fore, hand = found.parts["arm"]
     np.testing.assert_allclose(fore.origin, [0.0, -upper.length, 0.0])
     np.testing.assert_allclose(hand.origin, [0.0, -upper.length - fore.length, 0.0])
@@ -148,7 +153,7 @@ def test_a_segments_own_inertia_may_stand_in_the_file(tmp_path: Path, standing_p
     path.write_text(source.replace('parts = ["forearm", "hand"]', ten), encoding="utf-8")
     text = path.read_text(encoding="utf-8").replace('["upper_arm"]\nboth', '["upper_arm", "forearm"]\nboth')
     path.write_text(text, encoding="utf-8")
-    plan = load_model(path, PERSON, "opencap").calibrate(standing_person, side="right").measured_plan()
+    plan = load_model(path, PERSON, "opencap").calibrate(standing_person, how=Calibration(side="right")).measured_plan()
     np.testing.assert_allclose(
         plan.inertia["forearm"].vector, RigidBody.from_vector([2, 0, -0.4, 0, 0.2, 0.01, 0.2, 0, 0, 0]).vector
     )

@@ -13,6 +13,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.calibration.how import Calibration
 from dynakin.model.calibration.landmarks import corner
 from dynakin.model.definition import load_model
 from dynakin.model.markers.anatomy import anatomy, expanded, standing_at
@@ -55,7 +56,7 @@ def wearing(person: SimulatedTrial, marker_set: str) -> Recording:
 
 def measured(recording: Recording, marker_set: str) -> CalibratedModel:
     up = "+Y" if marker_set == "rizzoli-trunk" else "auto"  # a trunk is hardly higher than broad
-    return load_model("fullbody", WHO, markers=marker_set).calibrate(recording, vertical=up)
+    return load_model("fullbody", WHO, markers=marker_set).calibrate(recording, how=Calibration(vertical=up))
 
 
 def difference_deg(person: SimulatedTrial, initial: CalibratedModel, coordinate: str) -> float:

@@ -43,7 +43,7 @@ def calibrated(trial: Recording, static: Recording) -> tuple[CalibratedModel, li
 
 def test_markers_that_stay_where_they_are() -> None:
     found, said = calibrated(squat(), standing({}))
-    assert said == [] and found.moved_joints == () and less_sure_joints(found) == {}
+    assert said == [] and found.provenance.moved_joints == () and less_sure_joints(found) == {}
 
 
 @pytest.mark.parametrize(("name", "by"), [("r_knee", (0.0, 0.025, 0.0)), ("L_knee", (0.0, 0.025, 0.0))])
@@ -51,7 +51,10 @@ def test_one_that_slipped_is_named(name: str, by: tuple[float, float, float]) ->
     found, (said,) = calibrated(squat(), standing({name: by}))
     assert said.topic == "calibration" and f"({name})" in said.text and "--static" in said.text
     side = name[0].lower()
-    assert set(found.moved_joints) == {f"knee_{side}", f"ankle_{side}"}  # along the line between both it lies inwards
+    assert set(found.provenance.moved_joints) == {
+        f"knee_{side}",
+        f"ankle_{side}",
+    }  # along the line between both it lies inwards
     assert less_sure_joints(found) == dict.fromkeys((f"shank_{side}", f"foot_{side}"), ONE_SIDED)
 
 
@@ -60,7 +63,12 @@ def test_markers_of_another_day() -> None:
     by = {name: tuple(rng.normal(0.0, 0.009, 3)) for name in squat().marker_names}
     found, said = calibrated(squat(), standing(by))
     assert any("as if all were put on anew" in message.text for message in said)
-    assert found.hips == "supposed" and set(found.moved_joints) == {"knee_r", "knee_l", "ankle_r", "ankle_l"}
+    assert found.provenance.hips == "supposed" and set(found.provenance.moved_joints) == {
+        "knee_r",
+        "knee_l",
+        "ankle_r",
+        "ankle_l",
+    }
 
 
 @pytest.mark.parametrize("in_trial", [True, False])

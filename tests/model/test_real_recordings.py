@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
+from dynakin.model.calibration.how import Calibration
 from dynakin.model.definition import load_model
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.read import read
@@ -134,7 +135,7 @@ def test_static1_as_the_trial_and_as_the_static(data_dir: Path) -> None:
 def test_s1_squat_without_t10_and_arms(data_dir: Path, side: str) -> None:
     recording = read(data_dir / PIG / "S1_FlywheelSquat.c3d")
     subject = Subject(mass_kg=78.6, height_m=1.74, sex="male")
-    found = load_model("squat7", subject).calibrate(recording, side=side)
+    found = load_model("squat7", subject).calibrate(recording, how=Calibration(side=side))
     plan = found.measured_plan()
     assert found.side == ("left" if side == "auto" else side)  # RSHO is missing for 68 frames
     assert set(plan.geometry.locked) == {"thoracic", "shoulder"}

@@ -59,7 +59,7 @@ def hips(found: CalibratedModel) -> np.ndarray:
 def test_the_trial_shows_one_that_the_standing_person_does_not(lacks: tuple[str, ...]) -> None:
     found = calibrated(squat(), without(standing(), *lacks))
     np.testing.assert_allclose(hips(found), hips_when_all_is_seen(), atol=0.008)
-    assert found.hips == "measured" and not about(found.messages, "joints")
+    assert found.provenance.hips == "measured" and not about(found.messages, "joints")
     assert any(f"does not show {lacks[0]}" in message.text for message in about(found.messages, "calibration"))
 
 
@@ -70,7 +70,7 @@ def test_the_trial_shows_two_but_for_a_turn(lacks: tuple[str, ...]) -> None:
     said = about(found.messages, "joints")
     assert {message.level for message in said} == {"warning"} and len(said) == 2
     if "r.ASIS" in lacks:
-        assert found.hips == "supposed"
+        assert found.provenance.hips == "supposed"
         assert less_sure_joints(found).items() >= {"thigh_r": OF_HIPS["supposed"]["thigh"]}.items()
 
 
@@ -82,13 +82,13 @@ def test_the_other_side_has_what_nobody_shows(lacks: str, stands: bool) -> None:
     np.testing.assert_allclose(hips(found), hips_when_all_is_seen(), atol=0.02)
     (said,) = about(found.messages, "joints")
     assert said.level == "warning" and f"nothing shows {lacks}" in said.text
-    assert found.hips == "supposed" and lacks not in found.recorded_markers
+    assert found.provenance.hips == "supposed" and lacks not in found.recorded_markers
 
 
 def test_hips_from_proportions_are_said_and_nothing_of_the_legs_is_as_sure() -> None:
     gone = ("r.ASIS", "r.PSIS")
     found = calibrated(without(squat(), *gone), without(standing(), *gone))
-    assert found.hips == "proportions"
+    assert found.provenance.hips == "proportions"
     (said,) = about(found.messages, "joints")
     assert said.level == "warning" and "L.ASIS and L.PSIS" in said.text
     times = less_sure_joints(found)
@@ -97,5 +97,5 @@ def test_hips_from_proportions_are_said_and_nothing_of_the_legs_is_as_sure() -> 
 
 def test_a_pelvis_that_is_seen_stays_as_it_is() -> None:
     found = calibrated(squat(), standing())
-    assert found.hips == "measured" and less_sure_joints(found) == {}
+    assert found.provenance.hips == "measured" and less_sure_joints(found) == {}
     assert not any("does not show" in message.text for message in found.messages)

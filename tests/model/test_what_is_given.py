@@ -13,6 +13,7 @@ from dynakin import Sample, Subject, load_model
 from dynakin.errors import DynakinError
 from dynakin.messages import about, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.calibration.how import Calibration
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate
 
@@ -22,9 +23,9 @@ def walk() -> Recording:
     return simulate("fullbody", "gait", 7, 2.5, markers="opencap").recording
 
 
-def calibrated(height_m: float = 1.75, **given: Any) -> CalibratedModel:
+def calibrated(height_m: float = 1.75, static: Recording | None = None, **given: Any) -> CalibratedModel:
     subject = Subject(mass_kg=70.0, height_m=height_m, sex="male")
-    return load_model("fullbody", subject).calibrate(walk(), **given)
+    return load_model("fullbody", subject).calibrate(walk(), static=static, how=Calibration(**given))
 
 
 @pytest.mark.parametrize("forward", ["-X", "+Z", "-Z"])

@@ -10,6 +10,7 @@ import pytest
 
 import dynakin
 from dynakin.bindings import _core
+from dynakin.model.calibration.how import Calibration
 from dynakin.simulation.bodies.body import ten_numbers
 from dynakin.simulation.bodies.subject import Spread
 from dynakin.simulation.output import SimulatedTrial
@@ -141,7 +142,9 @@ def test_squat7_initialises_on_its_own_simulation(side: str) -> None:
     """Coordinates and lengths as the model measures them from landmarks: its signs and zeros are the simulator's."""
     trial = simulate("squat7", "squat", 3, 5.0, noise=PERFECT)
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    start = dynakin.load_model("squat7", subject, markers="plug-in-gait").calibrate(trial.recording, side=side)
+    start = dynakin.load_model("squat7", subject, markers="plug-in-gait").calibrate(
+        trial.recording, how=Calibration(side=side)
+    )
     truth = trial.truth.data["coordinates"].isel(time=0)
     named = dict(zip(start.names, start.x0, strict=True))
     for name in ("toe", "ankle", "knee", "hip", "lumbar", "thoracic", "shoulder"):

@@ -124,8 +124,8 @@ def assemble(
         "height_m": initial.height_m,
         "side": initial.side,
         "held": dict(initial.held),
-        "marker_places": "guessed" if initial.guessed_places else "named",
-        "unmarked_joints": list(initial.unmarked_joints),
+        "marker_places": "guessed" if initial.provenance.guessed_places else "named",
+        "unmarked_joints": list(initial.provenance.unmarked_joints),
         "ground": {
             "vertical": initial.ground.vertical,
             "forward": initial.ground.forward.tolist(),

@@ -160,7 +160,7 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     """By where the joints of a model come from, and by the person's physique."""
     if calibrated.plan is None:
         return SCALED
-    sizes = UNMARKED if calibrated.unmarked_joints else LANDMARKS
+    sizes = UNMARKED if calibrated.provenance.unmarked_joints else LANDMARKS
     if not calibrated.heavy:
         return sizes
     farther = 1.0 if calibrated.own_inertia else HEAVY_CENTRE
@@ -170,10 +170,11 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
 
 def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:
     """Segment -> how many times as far off the centre of its joint may be as those of others."""
-    of_hips = {f"{part}{side}": times for side in SUFFIXES.values() for part, times in OF_HIPS[calibrated.hips].items()}
-    if calibrated.unmarked_joints:  # all are said to be as unsure
+    known = calibrated.provenance
+    of_hips = {f"{part}{side}": times for side in SUFFIXES.values() for part, times in OF_HIPS[known.hips].items()}
+    if known.unmarked_joints:  # all are said to be as unsure
         return of_hips
-    turns = angles_of((*calibrated.one_sided_joints, *calibrated.moved_joints))
+    turns = angles_of((*known.one_sided_joints, *known.moved_joints))
     one_sided = {s.name: ONE_SIDED for s in calibrated.spec.segments if turns & {axis.coordinate for axis in s.axes}}
     found = of_hips | one_sided
     since: dict[str, float] = {}

@@ -28,6 +28,7 @@ from dynakin.filter.tracker import Tracker
 from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.declared import with_contacts, with_loads
+from dynakin.model.calibration.how import Calibration
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject, with_identified
 from dynakin.progress import Progress
@@ -129,6 +130,16 @@ class Estimator:
         for name, value in chosen.items():
             object.__setattr__(self, name, value)
 
+    @property
+    def how(self) -> Calibration:
+        """How the model is calibrated."""
+        return Calibration(self.side, self.vertical, self.forward, self.priors, self.bounds)
+
+    def of_person(self, measured: CalibratedModel) -> Estimator:
+        """The same for somebody whose mass and height are known, as measured in another trial."""
+        known = {"mass_kg": measured.mass_kg, "height_m": measured.height_m}
+        return replace(self, model=self.model.with_subject(self.model.subject.changed(**known)))
+
     @one_blas_thread
     def calibrate(self, recording: Recording, *, static: Recording | None = None) -> CalibratedModel:
         """The model of one person: measured on a recording (or the first seconds of a live one), with the identified
@@ -137,15 +148,7 @@ class Estimator:
         Raises:
             ModelError, RecordingError: as in `run`.
         """
-        calibrated = self.model.calibrate(
-            recording,
-            static=static,
-            side=self.side,
-            vertical=self.vertical,
-            forward=self.forward,
-            priors=self.priors,
-            bounds=self.bounds,
-        )
+        calibrated = self.model.calibrate(recording, static=static, how=self.how)
         if self.parameters is not None:
             calibrated = with_identified(calibrated, self.parameters)
         calibrated = replace(calibrated, messages=(*calibrated.messages, *calibrated.unlike_the_tables()))

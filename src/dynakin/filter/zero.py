@@ -68,7 +68,8 @@ def standing_zero(estimator: Estimator, estimate: Estimate, static: Recording | 
 
 
 def _estimated_anew(estimator: Estimator, estimate: Estimate, standing: Recording, window: slice) -> dict[str, float]:
-    start = with_loads(_standing_model(estimator, standing), estimator.loads)
+    standing_model = estimator.model.calibrate(standing, static=standing, how=estimator.how)
+    start = with_loads(standing_model, estimator.loads)
     tracker = estimator.start(_as_identified(start, estimate))
     initial = tracker.calibrated
     still = standing.window(float(standing.time[window.start]), float(standing.time[window.stop - 1]))
@@ -83,18 +84,6 @@ def _estimated_anew(estimator: Estimator, estimate: Estimate, standing: Recordin
     turning = np.array([kinds[name] == "rotation" for name in free])
     locked = {c.name: float(c.value) for c in initial.spec.coordinates if c.locked and kinds[c.name] == "rotation"}
     return locked | mean_angles(free, turning, state[:, : len(free)])
-
-
-def _standing_model(estimator: Estimator, static: Recording) -> CalibratedModel:
-    return estimator.model.calibrate(
-        static,
-        static=static,
-        side=estimator.side,
-        vertical=estimator.vertical,
-        forward=estimator.forward,
-        priors=estimator.priors,
-        bounds=estimator.bounds,
-    )
 
 
 def _as_identified(start: CalibratedModel, estimate: Estimate) -> CalibratedModel:

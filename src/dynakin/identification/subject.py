@@ -168,9 +168,8 @@ def with_subject(identifying: IdentifyingTrial) -> tuple[IdentifyingTrial, list[
 def _estimator(identifying: IdentifyingTrial) -> Estimator:
     """Of the first preset that has a smoother; somebody whose mass was not given weighs what the identifying trial's
     own plates say."""
-    setup, measured = identifying.setup, identifying.initial
+    setup = identifying.setup
     smooth = [preset for preset, noise in setup.noise.items() if can_smooth(noise)]
     estimator = setup.estimator(smooth[0] if smooth else next(iter(setup.noise)))
-    subject = setup.definition.subject.changed(mass_kg=measured.mass_kg, height_m=measured.height_m)
     noise = estimator.noise if smooth else presets.default()
-    return replace(estimator, model=setup.definition.with_subject(subject), noise=noise)
+    return replace(estimator.of_person(identifying.initial), noise=noise)

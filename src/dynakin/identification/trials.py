@@ -171,7 +171,7 @@ class Common:
                 lost the person in too many frames.
         """
         recording = replace(recording, plates=())
-        start = self._start(recording)
+        start = start_as(self.initial, self.estimator, recording, self.static)
         markers = marker_paths(recording, self.initial, start.ground)
         coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
         frozen = freeze(self.initial, initial_values(self.initial), coordinates)
@@ -231,7 +231,7 @@ class Common:
             raise RecordingError(f"{where}: {other}; expected trials of one person with the same markers")
         if not recording.plates:
             raise RecordingError(f"{where}: no force plates, expected at least one; give its ground forces (--forces)")
-        start = self._start(replace(recording, plates=()))
+        start = start_as(self.initial, self.estimator, replace(recording, plates=()), self.static)
         wrench, doubts = self._measured_wrench(recording, start)
         known_s = np.isfinite(wrench).all(axis=1).sum() / recording.rate
         if doubts and known_s < SHORTEST_S:
@@ -250,19 +250,6 @@ class Common:
     def measured(self, recording: Recording, progress: Progress | None = None) -> MeasuredTrial:
         """A trial to identify on."""
         return self.with_plates(self.see(recording, progress=progress), recording)
-
-    def _start(self, recording: Recording) -> CalibratedModel:
-        estimator = self.estimator
-        return start_as(
-            self.initial,
-            estimator.model,
-            recording,
-            None,
-            self.static,
-            forward=estimator.forward,
-            priors=estimator.priors,
-            bounds=estimator.bounds,
-        )
 
 
 def middle_of(count: int) -> int:

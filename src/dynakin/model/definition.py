@@ -18,6 +18,7 @@ from dynakin.model.calibration.calibrated import (
     first_centre_of_pressure,
     starting_state,
 )
+from dynakin.model.calibration.how import AUTO, Calibration
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import Asked, measure
 from dynakin.model.markers.fit import choose_marker_set, lacking
@@ -32,11 +33,10 @@ from dynakin.model.schema import ModelFile
 from dynakin.model.spec import to_core
 from dynakin.model.table import BodyTable, load_table
 from dynakin.recordings.companions import told_of_the_static
-from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import listed
-from dynakin.settings.model import Bounds, OpenSimOptions, Priors
+from dynakin.settings.model import OpenSimOptions
 from dynakin.settings.settings import FunctionalJoint
 from dynakin.settings.strict import nearest, read_toml, validate
 from dynakin.settings.subject import Subject
@@ -90,27 +90,13 @@ class Definition(Protocol):
         """
 
     def calibrate(
-        self,
-        recording: Recording,
-        *,
-        static: Recording | None = None,
-        side: str = "auto",
-        vertical: str = "auto",
-        forward: str | tuple[float, float, float] = "auto",
-        priors: Priors | None = None,
-        bounds: Bounds | None = None,
-        ground: GroundFrame | None = None,
+        self, recording: Recording, *, static: Recording | None = None, how: Calibration = AUTO
     ) -> CalibratedModel:
         """The model of one person, calibrated on a recording; an OpenSim model brings its own lengths and places.
 
         Args:
             static: a recording of the same person and markers, standing; lengths and marker places come from it.
-            side: limb markers of a lumped model: "right", "left", "both" (separate sites), "auto" (fewest gaps, right
-                on a tie).
-            vertical, forward: directions of the laboratory, found in the recording where "auto".
-            priors, bounds: other numbers than the defaults of ``dynakin.settings.model``.
-            ground: directions of the ground frame, where they are known already. Its origin is replaced by the model's
-                ground landmark.
+            how: what is said by hand of sides, directions, priors and bounds.
 
         Raises:
             ModelError, RecordingError: the model, the markers and the recording do not fit; one line says what was
@@ -185,22 +171,12 @@ class ModelDefinition:
         return match.marker_set.name, expected, found, lacks
 
     def calibrate(
-        self,
-        recording: Recording,
-        *,
-        static: Recording | None = None,
-        side: str = "auto",
-        vertical: str = "auto",
-        forward: str | tuple[float, float, float] = "auto",
-        priors: Priors | None = None,
-        bounds: Bounds | None = None,
-        ground: GroundFrame | None = None,
+        self, recording: Recording, *, static: Recording | None = None, how: Calibration = AUTO
     ) -> CalibratedModel:
         """As ``Definition.calibrate``: lengths and marker places from the first (or standing) frames, inertia from the
         table, coordinates from landmarks and, in space, markers."""
         asked = Asked(
-            self.model, self.path, self.subject, self.table, self.marker_set, self.functional,
-            recording, static, side, vertical, forward, ground,
+            self.model, self.path, self.subject, self.table, self.marker_set, self.functional, recording, static, how
         )  # fmt: skip
         with told_of_the_static(recording, static):
             plan, rest = measure(asked)
@@ -215,11 +191,10 @@ class ModelDefinition:
         messages += _held_knees(held, marked)
         held = _not_known(plan, held)
         spec = to_core(plan)
-        priors = priors or Priors()
         state, said = starting_state(
             spec,
-            bounds=plan.bounds(bounds or Bounds(), priors),
-            prior=plan.prior(priors),
+            bounds=plan.bounds(how.bounds, how.priors),
+            prior=plan.prior(how.priors),
             table=plan.table_values(),
             speeds=speeds,
         )
@@ -240,16 +215,12 @@ class ModelDefinition:
             parts=rest.parts,
             messages=tuple(messages),
             plan=plan,
-            foot_markers=rest.trial.match.foot_markers,
+            markers_of_fixed_feet={} if plan.model.feet else rest.trial.match.foot_markers,
             feet=plan.model.feet,
             unmarked_kg=unmarked_kg,
             held=held,
-            joint_prior=plan.joint_prior(priors),
-            guessed_places=bool(rest.trial.match.guessed),
-            unmarked_joints=rest.unmarked_joints,
-            one_sided_joints=rest.one_sided_joints,
-            moved_joints=rest.moved_joints,
-            hips=rest.hips,
+            joint_prior=plan.joint_prior(how.priors),
+            provenance=rest.provenance,
         )
 
 

@@ -195,7 +195,8 @@ def check_loaded(estimator: Estimator, initial: CalibratedModel, recording: Reco
     Raises:
         RecordingError: they cannot be meant so.
     """
-    check = check_plates(recording, initial.ground, None if initial.feet else initial.weighed_kg, initial.foot_markers)
+    declared_kg = None if initial.feet else initial.weighed_kg
+    check = check_plates(recording, initial.ground, declared_kg, initial.foot_markers)
     if check.refusal:
         raise RecordingError(f"plates: {check.refusal}")
     weighed = check.mass_kg_from_plates is not None

@@ -17,7 +17,6 @@ from dynakin.filter.ground.plate_sum import doubtful_mass
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
@@ -26,7 +25,6 @@ from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.tracking import why_lost, without_lost
 from dynakin.settings.lag import frames_later, known_lag
-from dynakin.settings.model import Bounds, Priors
 from dynakin.units import COMPONENTS
 from dynakin.validation.case import Setup
 from dynakin.validation.freeze import final_values, freeze, initial_values
@@ -146,7 +144,8 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     """
     recording = replace(recording, plates=())
     setup, measured = identified.setup, identified.initial
-    start = _start(identified, recording)
+    standing = identified.static or identified.recording
+    start = start_as(measured, setup.common, recording, standing, identified.ground)
     markers = marker_paths(recording, measured, start.ground)
     blank = np.full((recording.n_frames, 6), np.nan)
     coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
@@ -263,47 +262,18 @@ def _refuse_lost(estimate: Estimate, method: str) -> None:
 
 def start_as(
     measured: CalibratedModel,
-    definition: Definition,
+    estimator: Estimator,
     recording: Recording,
-    ground: GroundFrame | None,
     static: Recording,
-    *,
-    forward: str | tuple[float, float, float],
-    priors: Priors | None,
-    bounds: Bounds | None,
+    ground: GroundFrame | None = None,
 ) -> CalibratedModel:
     """Where a trial begins on a model that was ``measured`` on another one: lengths, places and body as there.
 
     Args:
-        definition: that was measured. ground: of the same laboratory, None: found. static: lengths come from it.
-        forward, priors, bounds: as for `Definition.calibrate`.
+        estimator: that measured it. static: lengths come from it. ground: of the same laboratory, None: found.
     """
-    known = {"mass_kg": measured.mass_kg, "height_m": measured.height_m}
-    return definition.with_subject(definition.subject.changed(**known)).calibrate(
-        recording,
-        static=static,
-        side=measured.side,
-        vertical=measured.ground.vertical,
-        forward=forward,
-        priors=priors,
-        bounds=bounds,
-        ground=ground,
-    )
-
-
-def _start(identified: IdentifyingTrial, recording: Recording) -> CalibratedModel:
-    """Where the judging trial begins; lengths, places and body as measured for the identifying one."""
-    setup = identified.setup
-    return start_as(
-        identified.initial,
-        setup.definition,
-        recording,
-        identified.ground,
-        identified.static or identified.recording,
-        forward=setup.common.forward,
-        priors=setup.common.priors,
-        bounds=setup.common.bounds,
-    )
+    how = replace(estimator.how, side=measured.side, vertical=measured.ground.vertical, ground=ground)
+    return estimator.of_person(measured).model.calibrate(recording, static=static, how=how)
 
 
 def _inverse(setup: Setup, start: CalibratedModel, recording: Recording) -> dict[str, Array]:

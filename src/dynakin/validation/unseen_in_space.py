@@ -176,10 +176,9 @@ def _of(estimate: Estimate, name: str, window: npt.NDArray[np.bool_]) -> Array:
 
 def _without_plates(estimator: Estimator, ready: Prepared, recording: Recording, static: Recording | None) -> Array:
     """The total wrench (T, 6) by the motion, of a run that has no plates but the same person."""
-    known = {"mass_kg": ready.calibrated.mass_kg, "height_m": ready.calibrated.height_m}
-    subject = estimator.model.subject.changed(**known)
-    without = replace(estimator, model=estimator.model.with_subject(subject))
-    estimate = without.run(replace(recording, plates=()), static=static, lag_s=ready.lag_s)
+    estimate = estimator.of_person(ready.calibrated).run(
+        replace(recording, plates=()), static=static, lag_s=ready.lag_s
+    )
     wrench = _of(estimate, "wrench_estimated", evaluation_window(recording.time))
     return ready.calibrated.ground.wrench_to_ground(estimate.ground.wrench_to_laboratory(wrench))
 

@@ -16,6 +16,7 @@ from dynakin.filter.augment import initial_covariance
 from dynakin.filter.systematic import Systematic
 from dynakin.messages import Message
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.calibration.how import Calibration
 from dynakin.model.definition import Definition, load_model
 from dynakin.model.opensim.calibrate import limits_of
 from dynakin.model.opensim.definition import load_opensim
@@ -221,7 +222,7 @@ def test_too_few_markers_for_a_posture_are_refused(folder: Path, squats: Recordi
     few = [squats.marker_names.index(name) for name in ("C7", "r_toe", "L_toe")]
     poor = replace(squats, marker_names=tuple(squats.marker_names[k] for k in few), markers=squats.markers[:, few])
     with pytest.raises(ModelError, match=r"squats1.*3 of the 49 markers .*C7.*expected at least \d+ for its \d+ free"):
-        load_model(folder / FILE, Subject(mass_kg=60.05)).calibrate(poor, forward=(1.0, 0.0, 0.0))
+        load_model(folder / FILE, Subject(mass_kg=60.05)).calibrate(poor, how=Calibration(forward=(1.0, 0.0, 0.0)))
 
 
 def test_what_no_marker_moves_is_held_and_its_mass_unseen(folder: Path, squats: Recording) -> None:

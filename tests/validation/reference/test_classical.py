@@ -9,6 +9,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError
+from dynakin.model.calibration.how import Calibration
 from dynakin.model.calibration.posture import find_posture
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
@@ -41,7 +42,7 @@ def test_markers_on_the_joints_give_the_true_leg_angles(perfect: Perfect) -> Non
 def test_angles_are_those_that_the_models_own_posture_finds(noisy: SimulatedTrial, model: str, side: str) -> None:
     """`find_posture` solves each joint by iteration; the classical method must agree at every frame and side."""
     definition = dynakin.load_model(model, dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male"), markers="opencap")
-    initial = definition.calibrate(noisy.recording, side=side)
+    initial = definition.calibrate(noisy.recording, how=Calibration(side=side))
     plan, chain = initial.plan, PlanarChain.of(initial.plan)
     paths = landmark_paths(noisy.recording, initial, definition)
     angles = classical_angles(chain, plan, paths)
@@ -74,7 +75,7 @@ def test_a_lost_marker_leaves_its_angles_open_and_no_others(perfect: Perfect) ->
     markers = recording.markers.copy()
     markers[300:340, recording.marker_names.index("r_knee")] = np.nan
     lost = replace(recording, markers=markers)
-    initial = perfect.definition.calibrate(lost, side="right")
+    initial = perfect.definition.calibrate(lost, how=Calibration(side="right"))
     paths = landmark_paths(lost, initial, perfect.definition)
     angles = classical_angles(PlanarChain.of(initial.plan), initial.plan, paths)
     missing = np.isnan(angles)
@@ -88,7 +89,7 @@ def test_both_sides_leave_a_gap_where_one_side_is_lost(perfect: Perfect) -> None
     markers = recording.markers.copy()
     markers[300:340, recording.marker_names.index("L_ankle")] = np.nan
     lost = replace(recording, markers=markers)
-    initial = perfect.definition.calibrate(lost, side="both")
+    initial = perfect.definition.calibrate(lost, how=Calibration(side="both"))
     ankle = landmark_paths(lost, initial, perfect.definition)["ankle"]
     assert np.isnan(ankle[300:340]).all() and np.isfinite(ankle[340:]).all()
 

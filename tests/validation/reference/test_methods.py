@@ -10,6 +10,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError
+from dynakin.model.calibration.how import Calibration
 from dynakin.recordings.formats.mot import read_table
 from dynakin.results.measures.fit import signal_fit, truth_error
 from dynakin.simulation.trial import simulate_squat
@@ -75,7 +76,7 @@ def test_gaps_are_filled_or_left_and_both_said(perfect: Perfect) -> None:
     knee = recording.marker_names.index("r_knee")
     markers[300:305, knee] = markers[600:640, knee] = np.nan
     gappy = replace(recording, markers=markers)
-    initial = perfect.definition.calibrate(gappy, side="right")
+    initial = perfect.definition.calibrate(gappy, how=Calibration(side="right"))
     reference = reference_methods(gappy, initial, perfect.definition)
     missing = np.isnan(reference.data["wrench_estimated"].sel(component="fy").values)
     assert missing.nonzero()[0].tolist() == list(range(600, 640))

@@ -26,7 +26,7 @@ def beyond_the_feet(initial: CalibratedModel, recording: Recording, markers: Arr
     """(T,) frames in which the ground would have to push there, by the motion of the centre of mass; none of a body
     with a foot that nobody sees."""
     beyond = np.zeros(len(markers), dtype=bool)
-    feet = [[m for m, n in enumerate(initial.recorded_markers) if n in own] for own in initial.markers_on_feet.values()]
+    feet = [[m for m, n in enumerate(initial.recorded_markers) if n in own] for own in initial.foot_markers.values()]
     found = mass_centre(initial, recording.time, markers) if len(feet) > 1 and all(feet) else None
     if found is None:
         return beyond

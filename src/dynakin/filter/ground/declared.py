@@ -69,7 +69,7 @@ def plates_of_their_own(
         assigned: plate -> foot or contact, as given.
     """
     names = list(initial.contacts)
-    feet = [places for _, places in foot_places(recording, initial.ground, initial.markers_on_feet).values()]
+    feet = [places for _, places in foot_places(recording, initial.ground, initial.foot_markers).values()]
     pressed = {
         p: _Pressed.of(GroundPlate.of(plate, initial.ground), paths[:, 1:], may, bool(loads.on[:, :, p].any()), feet)
         for p, plate in enumerate(recording.plates)

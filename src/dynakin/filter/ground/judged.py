@@ -165,7 +165,7 @@ class OnGround:
         # steps off the plates: their mean load is no mass
         mass = None if initial.feet else initial.weighed_kg
         steps_kg = initial.weighed_kg if initial.feet and not initial.contacts else None
-        check = check_plates(recording, initial.ground, mass, initial.markers_on_feet, loads, steps_kg)
+        check = check_plates(recording, initial.ground, mass, initial.foot_markers, loads, steps_kg)
         if check.refusal:
             raise RecordingError(
                 f"{recording.plates_file}: {check.refusal}{_how_to_give(initial, loads, check.under_no_foot)}"
@@ -356,7 +356,7 @@ def _loads_of_feet(trial: GroundTrial, taken: Mapping[str, tuple[str, ...]] | No
     loads = foot_loads(
         recording,
         initial.ground,
-        initial.markers_on_feet,
+        initial.foot_markers,
         assigned=assigned,
         others=list(initial.contacts),
         given=taken,

@@ -136,9 +136,9 @@ def _zeroed(trial: GroundTrial) -> tuple[GroundTrial, list[Message]]:
     initial = trial.initial
     if not initial.feet or initial.contacts:
         return trial, []
-    recording, blanks = without_blanks(trial.recording, initial.ground, initial.markers_on_feet)
+    recording, blanks = without_blanks(trial.recording, initial.ground, initial.foot_markers)
     trial = replace(trial, recording=recording)
-    recording, said = without_offsets(recording, initial.ground, initial.markers_on_feet)
+    recording, said = without_offsets(recording, initial.ground, initial.foot_markers)
     said = [*blanks, *said]
     if recording is trial.recording:
         return trial, said

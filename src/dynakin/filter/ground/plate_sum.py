@@ -161,7 +161,7 @@ def _undeclared_in_words(
 ) -> tuple[Message, Flags]:
     """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts: what they have
     too much is under a foot that stands alone (a load that somebody carries is between two)."""
-    time, feet = recording.time, initial.markers_on_feet
+    time, feet = recording.time, initial.foot_markers
     beyond = np.zeros((len(time), len(feet)), dtype=bool)
     judged = np.isfinite(found.excess[:, 1])
     weight = initial.weighed_kg * GRAVITY_M_S2

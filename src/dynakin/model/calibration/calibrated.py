@@ -75,6 +75,28 @@ class Coupled:
         return np.asarray(places[:, [model.segment_names.index(name) for name in self.kinds], 0])
 
 
+@dataclass(frozen=True)
+class Provenance:
+    """Where the places of markers and joints come from, as far as it makes them less sure.
+
+    Attributes:
+        guessed_places: whether the places of the markers were guessed, because no marker set has their names.
+        unmarked_joints: knees and ankles that no marker shows, where the movement (`legs_in_motion`) or proportions
+            have them.
+        one_sided_joints: knees and ankles with a lateral marker alone and no measured width: their centres lie half an
+            adult's joint width inwards.
+        moved_joints: knees and ankles whose markers sit otherwise in the standing trial than in the trial.
+        hips: where their centres come from: markers of the pelvis; supposed, where some of these are put where two
+            others or the other side have them, or sit otherwise in the trial; or proportions of an adult.
+    """
+
+    guessed_places: bool = False
+    unmarked_joints: tuple[str, ...] = ()
+    one_sided_joints: tuple[str, ...] = ()
+    moved_joints: tuple[str, ...] = ()
+    hips: Hips = "measured"
+
+
 @dataclass(frozen=True, eq=False)
 class CalibratedModel(StartingState):
     """A model calibrated on one person, and the state from which the filter starts.
@@ -94,7 +116,8 @@ class CalibratedModel(StartingState):
         plan: the same as plain data; None for an OpenSim model.
         feet: "right", "left" -> segment on which the ground acts; empty for a model fixed in the ground.
         contacts: name -> segment, of the contacts that are declared in addition to the feet (a seat, hands on a rail).
-        foot_markers: "right", "left" -> the recording's names of the markers on that foot.
+        markers_of_fixed_feet: of a model fixed in the ground: "right", "left" -> the recording's names of the markers
+            on that foot, whichever of them are sites.
         unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
             added to the noise of the cameras.
         skin_lasts: how many times longer skin stays displaced than the noise settings say of a floating model.
@@ -104,14 +127,7 @@ class CalibratedModel(StartingState):
         own_inertia: whether inertia was identified of this person, and is not the table's.
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
         held: coordinate -> why nothing shows it, where it is held at an angle for lack of markers: results have none.
-        guessed_places: whether the places of the markers were guessed, because no marker set has their names.
-        unmarked_joints: knees and ankles that no marker shows, where the movement (`legs_in_motion`) or proportions
-            have them.
-        one_sided_joints: knees and ankles with a lateral marker alone: their centres lie half an adult's joint width
-            inwards.
-        moved_joints: knees and ankles whose markers sit otherwise in the standing trial than in the trial.
-        hips: where their centres come from: markers of the pelvis; supposed, where some of these are put where two
-            others or the other side have them, or sit otherwise in the trial; or proportions of an adult.
+        provenance: where places of markers and joints come from.
         joint_prior: how elements hang together at first; the others are independent.
         coupled: coordinates of an OpenSim model that follow others, and are none of ``spec``.
         in_radians: rotations, of ``coupled`` too, that OpenSim takes from a table in degrees as radians all the same.
@@ -130,7 +146,7 @@ class CalibratedModel(StartingState):
     messages: tuple[Message, ...]
     plan: ModelPlan | None
     feet: dict[str, str] = field(default_factory=dict)
-    foot_markers: dict[str, list[str]] = field(default_factory=dict)
+    markers_of_fixed_feet: dict[str, list[str]] = field(default_factory=dict)
     unmodelled_m: Array | float = 0.0
     skin_lasts: float = 1.0
     dimensionless: frozenset[str] = frozenset()
@@ -139,11 +155,7 @@ class CalibratedModel(StartingState):
     own_inertia: bool = False
     unmarked_kg: float = 0.0
     held: dict[str, str] = field(default_factory=dict)
-    guessed_places: bool = False
-    unmarked_joints: tuple[str, ...] = ()
-    one_sided_joints: tuple[str, ...] = ()
-    moved_joints: tuple[str, ...] = ()
-    hips: Hips = "measured"
+    provenance: Provenance = Provenance()
     joint_prior: JointPrior | None = None
     contacts: dict[str, str] = field(default_factory=dict)
     coupled: Coupled | None = None
@@ -193,11 +205,11 @@ class CalibratedModel(StartingState):
         return {side: foot for side, foot in self.feet.items() if shown[side] < least}
 
     @property
-    def markers_on_feet(self) -> dict[str, list[str]]:
+    def foot_markers(self) -> dict[str, list[str]]:
         """Foot -> the recording's names of the markers on its segment, and on those that hang on that (toes); none of
-        `unmarked_feet`. Of a model fixed in the ground: ``foot_markers``."""
+        `unmarked_feet`."""
         if not self.feet:
-            return self.foot_markers
+            return self.markers_of_fixed_feet
         return {side: [] if side in self.unmarked_feet else own for side, own in self._on_feet().items()}
 
     def _on_feet(self) -> dict[str, list[str]]:

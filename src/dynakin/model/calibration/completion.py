@@ -161,26 +161,16 @@ def completed(
                 f"{where}: segment {segment.name!r} of model {model.name} has {len(set(own) & set(known))} of the "
                 f"landmarks {', '.join(own)}, expected {_LEAST} or more: markers on it, or joint centres"
             )
-        hold = _held(segment, turns)
-        source = [shape[name] for name in have]
-        target = [found.landmarks[name] for name in have]
-        weights = [1.0] * len(have)
-        for name, (home, place) in template.markers.items():
-            seen = positions.get((name, "centre"))
-            if home == segment.name and seen is not None and np.isfinite(seen).all():
-                source.append(height_m * place)
-                target.append(seen)
-                weights.append(_MARKER_WEIGHT)
-        turn, shift = laid(np.array(source), np.array(target), np.array(weights), hold, height_m)
+        pairs = [(shape[name], found.landmarks[name], 1.0) for name in have]
+        pairs += _centre_markers(segment, positions, height_m)
+        source, target, weights = (np.array(column) for column in zip(*pairs, strict=True))
+        turn, shift = laid(source, target, weights, _held(segment, turns), height_m)
         turns[segment.name] = turn
         for name in missing:
             found.landmarks[name] = turn @ shape[name] + shift
             found.added[name] = segment.name
             _at_hinge(name, segment.side, known, found.landmarks)
-        new = set(missing) & set(frame_landmarks(segment))
-        for floor in (name for name in frame_landmarks(segment) if new and name.startswith("floor")):
-            up = next(name for name in frame_landmarks(segment) if name.startswith("over_floor"))
-            found.landmarks[up] = found.landmarks[floor] + turn @ np.array([0.0, 1.0, 0.0])  # flat in the proportions
+        _flat_floor(segment, missing, turn, found.landmarks)
         if segment.side is not None:
             mine, other = SUFFIXES[segment.side], next(s for side, s in SUFFIXES.items() if side != segment.side)
             shapes[f"{segment.name.removesuffix(mine)}{other}"] = {
@@ -200,6 +190,27 @@ def completed(
         )
         found.messages.append(note("calibration", f"{text}{', '.join(sorted(found.added))}."))
     return found
+
+
+def _centre_markers(segment: Segment, positions: Positions, height_m: float) -> list[tuple[Array, Array, float]]:
+    """Of each marker in the middle of a segment that is seen: the template's place (3,) m, its own (3,) m, a weight."""
+    markers = Proportions.load().markers
+    seen = {name: positions.get((name, "centre")) for name, (home, _) in markers.items() if home == segment.name}
+    return [
+        (height_m * markers[name][1], place, _MARKER_WEIGHT)
+        for name, place in seen.items()
+        if place is not None and np.isfinite(place).all()
+    ]
+
+
+def _flat_floor(segment: Segment, added: list[str], turn: Array, landmarks: dict[str, Array]) -> None:
+    """Puts the landmark over the floor of a segment whose frame is completed, in place: flat in the proportions."""
+    frame = frame_landmarks(segment)
+    if not set(added) & set(frame):
+        return
+    for floor in (name for name in frame if name.startswith("floor")):
+        up = next(name for name in frame if name.startswith("over_floor"))
+        landmarks[up] = landmarks[floor] + turn @ np.array([0.0, 1.0, 0.0])
 
 
 def _on_the_skin(model: ModelFile, known: Mapping[str, Array]) -> set[str]:

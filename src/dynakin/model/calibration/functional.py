@@ -288,23 +288,9 @@ def _markers_of(
         and key in source.match.names
         and np.isfinite(_standing(source, source.match.names[key], frames)).all()
     }
-    ends = [landmarks.get(f"{point}_{letter}") for point in _BONES.get(part, ())]
-    if len(names) < _FEWEST and len(ends) == 2 and ends[0] is not None and ends[1] is not None:
-        taken = {source.match.names[m.name, s] for m in marker_set.markers if not m.landmark_only
-                 for s in ("right", "left", "centre") if (m.name, s) in source.match.names}  # fmt: skip
-        start, end = ends[0], ends[1]
-        along = (end - start) / np.linalg.norm(end - start)
-        near: list[tuple[float, str, str]] = []
-        for own in source.recording.marker_names:
-            place, other = _standing(source, own, frames), find_marker(trial, own)
-            if own in taken or other is None or not np.isfinite(place).all():
-                continue
-            at = float((place - start) @ along)
-            across = float(np.linalg.norm(place - start - at * along))
-            share = at / float(np.linalg.norm(end - start))
-            if _ALONG_BONE[0] <= share <= _ALONG_BONE[1] and _NEAR_BONE_M[0] <= across <= _NEAR_BONE_M[1]:
-                near.append((across, own, other))
-        for _, own, other in sorted(near):
+    ends = [end for point in _BONES.get(part, ()) if (end := landmarks.get(f"{point}_{letter}")) is not None]
+    if len(names) < _FEWEST and len(ends) == 2:
+        for own, other in _along_bone(ends[0], ends[1], trial, source, frames):
             apart = [distance_sd_m(trial.marker(other), trial.marker(member)) for member in names.values()]
             if all(sd < _MOVES_WITH_M for sd in apart):
                 names[own] = other
@@ -315,3 +301,25 @@ def _markers_of(
             f"and no others move with them; expected {_FEWEST} or more, off one line"
         )
     return names
+
+
+def _along_bone(
+    start: Array, end: Array, trial: Recording, source: MarkedTrial, frames: npt.NDArray[np.intp]
+) -> list[tuple[str, str]]:
+    """Markers that the set does not place and that lie beside a bone (its ends, (3,) m) while standing, nearest first:
+    name while standing, name in the trial."""
+    match = source.match
+    placed = {m.name for m in match.marker_set.markers if not m.landmark_only}
+    taken = {recorded for (name, _), recorded in match.names.items() if name in placed}
+    length = float(np.linalg.norm(end - start))
+    along = (end - start) / length
+    near: list[tuple[float, str, str]] = []
+    for own in source.recording.marker_names:
+        place, other = _standing(source, own, frames), find_marker(trial, own)
+        if own in taken or other is None or not np.isfinite(place).all():
+            continue
+        at = float((place - start) @ along)
+        across = float(np.linalg.norm(place - start - at * along))
+        if _ALONG_BONE[0] <= at / length <= _ALONG_BONE[1] and _NEAR_BONE_M[0] <= across <= _NEAR_BONE_M[1]:
+            near.append((across, own, other))
+    return [(own, other) for _, own, other in sorted(near)]

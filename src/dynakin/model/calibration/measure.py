@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.body import check_body_mass, doubtful_height, find_height, find_mass, joint_widths
-from dynakin.model.calibration.calibrated import Hips
+from dynakin.model.calibration.calibrated import Provenance
 from dynakin.model.calibration.checks import (
     check_masses,
     check_standing,
@@ -26,6 +26,7 @@ from dynakin.model.calibration.completion import Completed, completed
 from dynakin.model.calibration.flat_feet import flat_slopes, lost_on_feet, never_flat, raised_heels, usual_slopes
 from dynakin.model.calibration.frames import MarkedTrial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
+from dynakin.model.calibration.how import Calibration
 from dynakin.model.calibration.landmark_markers import in_both, needed_markers, seen_together, table_markers
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
 from dynakin.model.calibration.legs_in_motion import (
@@ -50,7 +51,7 @@ from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
 from dynakin.recordings.companions import another_person
-from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
+from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.orientation import axis_vector, walks
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import MIN_STILL_S, standing_window
@@ -72,10 +73,7 @@ class Asked:
     functional: Mapping[str, Recording]
     recording: Recording
     static: Recording | None
-    side: str
-    vertical: str
-    forward: str | tuple[float, float, float]
-    ground: GroundFrame | None
+    how: Calibration
 
     @property
     def recordings(self) -> list[Recording]:
@@ -84,10 +82,7 @@ class Asked:
 
     def find_ground(self, recording: Recording, match: MarkerMatch) -> GroundFrame:
         """Of one of the recordings."""
-        find = find_laboratory_frame if self.model.floating else find_ground_frame
-        return find(
-            recording, vertical=self.vertical, forward=self.forward, pairs=match.facing_pairs, static=self.static
-        )
+        return self.how.find_ground(recording, match.facing_pairs, self.static, floating=self.model.floating)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +98,7 @@ class Measured:
     trial: MarkedTrial
     unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
     held: dict[str, str]  # coordinate -> why nothing shows it
-    unmarked_joints: tuple[str, ...]  # knees and ankles that no marker shows
-    one_sided_joints: tuple[str, ...]  # those with a lateral marker alone and no measured width
-    moved_joints: tuple[str, ...]  # knees and ankles whose markers sit otherwise in the standing trial
-    hips: Hips  # where their centres come from
+    provenance: Provenance
     still: bool  # the person stands still in the calibration frames
 
 
@@ -152,9 +144,9 @@ class _Still:
 def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     """The model filled with what the recording shows; errors as of ``Definition.calibrate``."""
     model, subject, table = asked.model, asked.subject, asked.table
-    if model.sided and asked.side in ("right", "left"):
+    if model.sided and asked.how.side in ("right", "left"):
         raise ModelError(
-            f"side is {asked.side}, but model {model.name} has both legs; expected auto, or a planar model"
+            f"side is {asked.how.side}, but model {model.name} has both legs; expected auto, or a planar model"
         )
     if asked.functional and not model.sided:
         raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
@@ -221,10 +213,13 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
         trial=trial,
         unplaced=tuple(c for c in marked.chosen if c.recorded not in placed_names),
         held={name: f"segment {segment} has no markers" for segment, names in marked.bare.items() for name in names},
-        unmarked_joints=unmarked,
-        one_sided_joints=tuple(n for n in LEG_JOINTS if n in finder.usual_widths - {*(asked.functional or ())}),
-        hips=trials.pelvis.hips(finder, found.added, asked.functional or (), trials.moved.hips(finder)),
-        moved_joints=trials.moved.joints(finder),
+        provenance=Provenance(
+            guessed_places=bool(trial.match.guessed),
+            unmarked_joints=unmarked,
+            one_sided_joints=tuple(n for n in LEG_JOINTS if n in finder.usual_widths - {*(asked.functional or ())}),
+            moved_joints=trials.moved.joints(finder),
+            hips=trials.pelvis.hips(finder, found.added, asked.functional or (), trials.moved.hips(finder)),
+        ),
         still=still.stands,
     )
 
@@ -237,13 +232,13 @@ def _matched(asked: Asked, messages: list[Message]) -> _Trials:
     recognised = recognise(recording, asked.marker_set)
     messages += recognised.messages
     as_asked = MarkedTrial.of(
-        recording, recognised.match, asked.ground or asked.find_ground(recording, recognised.match)
+        recording, recognised.match, asked.how.ground or asked.find_ground(recording, recognised.match)
     )
     messages += [note("ground", text) for text in as_asked.ground.how]
     trial = as_asked.facing() if model.floating else as_asked
     side = "both"
     if not model.sided:
-        side, how = choose_side(trial.match, recording, asked.side)
+        side, how = choose_side(trial.match, recording, asked.how.side)
         messages.append(note("calibration", how))
     if static is None:
         return _Trials(as_asked, trial, Pelvis.of(trial, trial, model), side, Moved())

@@ -5,15 +5,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
-from dynakin.messages import note
-from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure, starting_state
-from dynakin.model.calibration.pose_start import start_posture
+from dynakin.messages import Message, note
+from dynakin.model.calibration.calibrated import (
+    CalibratedModel,
+    StartingState,
+    first_centre_of_pressure,
+    starting_state,
+)
+from dynakin.model.calibration.how import AUTO, Calibration
+from dynakin.model.calibration.pose_start import PoseFit, start_posture
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.opensim.calibrate import (
     beyond_range,
@@ -26,19 +34,23 @@ from dynakin.model.opensim.calibrate import (
     reach_of,
     refuse_too_few,
 )
-from dynakin.model.opensim.description import OpenSimModel, person_of
+from dynakin.model.opensim.description import Marker, OpenSimModel, person_of
 from dynakin.model.opensim.feet import feet_of
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import coupled_of, in_radians, independent_coordinates, moved_by, to_spec, unseen
 from dynakin.model.schema import kinds_of
-from dynakin.model.state_priors import places_prior, state_bounds, state_prior
-from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
+from dynakin.model.state_priors import JointPrior, places_prior, state_bounds, state_prior
+from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
-from dynakin.settings.model import Bounds, OpenSimOptions, Priors
+from dynakin.settings.model import OpenSimOptions
 from dynakin.settings.strict import nearest, validate
 from dynakin.settings.subject import Subject
 from dynakin.units import gravity_problem
+
+Array = npt.NDArray[np.float64]
+Site = tuple[Marker, str]
+"""A marker of the file, and its name in the recording."""
 
 _MODEL_M = 0.003
 """Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
@@ -100,110 +112,32 @@ class OpenSimDefinition:
         return self.name, expected, found, "expected half of them" if 2 * len(found) < len(expected) else ""
 
     def calibrate(
-        self,
-        recording: Recording,
-        *,
-        static: Recording | None = None,
-        side: str = "auto",
-        vertical: str = "auto",
-        forward: str | tuple[float, float, float] = "auto",
-        priors: Priors | None = None,
-        bounds: Bounds | None = None,
-        ground: GroundFrame | None = None,
+        self, recording: Recording, *, static: Recording | None = None, how: Calibration = AUTO
     ) -> CalibratedModel:
-        """As ``Definition.calibrate``; ``side`` does not matter, for the file says where its markers are. The ground is
+        """As ``Definition.calibrate``; the side does not matter, for the file says where its markers are. The ground is
         the laboratory, Y up; X is forward where it is asked for, or where the file holds the body so that it cannot
         head anywhere."""
-        source, options, messages = (
-            self.source,
-            self.options,
-            [note("calibration", text) for text in self.source.left_out],
+        messages = [note("calibration", text) for text in self.source.left_out]
+        source, chosen, feet, frame = self._frame_and_feet(recording, static, how, messages)
+        lock, estimated = self._body(source, chosen, messages)
+        names = tuple(name for _, name in chosen)
+        kept = self.options.marker_places == "kept"
+        spec_at = partial(
+            to_spec,
+            source,
+            self.scales,
+            markers=[marker for marker, _ in chosen],
+            estimate_inertia=estimated,
+            estimate_places=not kept,
+            lock=lock,
         )
-        find = find_laboratory_frame if source.floating else find_ground_frame
-        chosen, measured_by = sites(source, options.leave_out, recording)
-        feet, found_by = feet_of(source, {str(side): body for side, body in options.feet.items()})
-        on_feet = foot_markers(source, chosen, feet)
-        pairs = facing_pairs(source, chosen, feet)
-        frame = ground or find(recording, vertical=vertical, forward=forward, pairs=pairs, static=static)
-        messages += [note("ground", text) for text in frame.how]
-        if options.scale_masses:
-            source = of_subject(
-                source, self.subject, [r for r in (static, recording) if r is not None], frame, on_feet, messages
-            )
-        else:
-            messages.append(note("mass", f"Mass {source.mass:.2f} kg: the OpenSim file's."))
-        messages += [note("calibration", text) for text in (*measured_by, *found_by)]
-        if static is not None:
-            messages.append(note("calibration", "The standing trial gives the mass only."))
-        kept = options.marker_places == "kept"
-        messages.append(
-            note(
-                "details",
-                "Marker places: kept as the OpenSim file has them."
-                if kept
-                else "Marker places: the OpenSim file's, calibrated by the recording.",
-            )
-        )
-        lock = unseen(source, {marker.body for marker, _ in chosen}) if options.lock_unseen else []
-        if lock:
-            messages.append(
-                note(
-                    "calibration",
-                    f"Coordinates that move no measured marker, locked at the file's value: {', '.join(lock)}.",
-                )
-            )
-        fixed = [c.name for c in independent_coordinates(source) if c.locked]
-        if fixed:
-            words = f"The file locks {', '.join(fixed)}: held at its values. Unlock there what the person moves."
-            messages.append(note("calibration", words))
-        carried = estimated_bodies(source, options.lightest_share, messages)
-
-        def spec_at(values: dict[str, float]) -> _core.ModelSpec:
-            return to_spec(
-                source,
-                self.scales,
-                markers=[marker for marker, _ in chosen],
-                estimate_inertia=carried,
-                estimate_places=not kept,
-                values=values,
-                lock=lock,
-            )
-
-        limits = limits_of(source)
-        measured = frame.points_to_ground(np.stack([recording.marker(name) for _, name in chosen], axis=1))
-        first = first_frame(measured)
-        fit = start_posture(
-            _core.Model(spec_at({})), measured[first], limits=limits, where=str(recording.path or recording.name)
-        )
-        messages.append(
-            note(
-                "details",
-                f"Start: frame {first + 1} ({recording.time[first]:.2f} s), where the model of {source.path.name} "
-                f"fits the markers to {1000.0 * fit.rms_m:.0f} mm (root mean square).",
-            )
-        )
-        messages += beyond_range(source, fit.coordinates)
-        spec = spec_at(fit.coordinates)
-        refuse_too_few(source, spec, [name for _, name in chosen], recording)
-        bodies = {body.name: body.rigid for body in source.bodies}
-        reach = reach_of(source)
-        lengths = {parameter.name: 1.0 for parameter in spec.parameters}
-        places = {marker.name: np.array(marker.location) for marker, _ in chosen}
-        table = {
-            f"inertia/{s.name}/{k}": v for s in spec.segments for k, v in zip(INERTIA_NAMES, s.inertia, strict=True)
-        }
+        measured = frame.points_to_ground(np.stack([recording.marker(name) for name in names], axis=1))
+        fit = _posed(_core.Model(spec_at(values={})), source, measured, recording, messages)
+        spec = spec_at(values=fit.coordinates)
+        refuse_too_few(source, spec, list(names), recording)
+        state, together = _start(source, spec, [marker for marker, _ in chosen], how, fit.rms_m, messages)
         skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
-        kinds, known = kinds_of(spec.segments), priors or Priors()
-        known = known.changed(marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
-        together = places_prior(places, {marker.name: marker.body for marker, _ in chosen}, known)
-        state, said = starting_state(
-            spec,
-            bounds=state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds(), {}),
-            prior=state_prior(kinds, lengths, {}, places, bodies, reach, known, {}) | together.sd,
-            table=table,
-            speeds={},
-        )
-        messages += said
+        masses = {body.name: body.rigid.mass for body in source.bodies}
         return CalibratedModel(
             spec=spec,
             **vars(state),
@@ -211,7 +145,7 @@ class OpenSimDefinition:
             soft_tissue_m=skin[:, 1],
             ground=frame,
             plate_centre=first_centre_of_pressure(recording, frame),
-            recorded_markers=tuple(name for _, name in chosen),
+            recorded_markers=names,
             side="both",
             mass_kg=source.mass,
             height_m=self.subject.height_m,
@@ -219,16 +153,96 @@ class OpenSimDefinition:
             messages=tuple(messages),
             plan=None,
             feet=feet,
-            foot_markers=on_feet,
             unmodelled_m=np.full(len(skin), _MODEL_M),
             skin_lasts=_SKIN_LASTS,
-            dimensionless=frozenset(lengths),
-            unmarked_kg=sum(bodies[name].mass for name in moved_by(source, lock)),
+            dimensionless=frozenset(parameter.name for parameter in spec.parameters),
+            unmarked_kg=sum(masses[name] for name in moved_by(source, lock)),
             held=dict.fromkeys(lock, "it moves no measured marker"),
             coupled=coupled_of(source),
             in_radians=in_radians(source),
             joint_prior=None if kept else together,
         )
+
+    def _frame_and_feet(
+        self, recording: Recording, static: Recording | None, how: Calibration, messages: list[Message]
+    ) -> tuple[OpenSimModel, list[Site], dict[str, str], GroundFrame]:
+        """The model with the subject's mass, its markers that are measured, the bodies of the feet, and the ground."""
+        source = self.source
+        chosen, measured_by = sites(source, self.options.leave_out, recording)
+        feet, found_by = feet_of(source, {str(side): body for side, body in self.options.feet.items()})
+        pairs = facing_pairs(source, chosen, feet)
+        frame = how.ground or how.find_ground(recording, pairs, static, floating=self.floating)
+        messages += [note("ground", text) for text in frame.how]
+        if self.options.scale_masses:
+            weighed = [r for r in (static, recording) if r is not None]
+            source = of_subject(source, self.subject, weighed, frame, foot_markers(source, chosen, feet), messages)
+        else:
+            messages.append(note("mass", f"Mass {source.mass:.2f} kg: the OpenSim file's."))
+        messages += [note("calibration", text) for text in (*measured_by, *found_by)]
+        if static is not None:
+            messages.append(note("calibration", "The standing trial gives the mass only."))
+        return source, chosen, feet, frame
+
+    def _body(
+        self, source: OpenSimModel, chosen: Sequence[Site], messages: list[Message]
+    ) -> tuple[list[str], list[str]]:
+        """Coordinates that are locked for want of markers, and bodies whose inertia is estimated."""
+        kept = self.options.marker_places == "kept"
+        places = "kept as the OpenSim file has them" if kept else "the OpenSim file's, calibrated by the recording"
+        messages.append(note("details", f"Marker places: {places}."))
+        lock = unseen(source, {marker.body for marker, _ in chosen}) if self.options.lock_unseen else []
+        if lock:
+            words = f"Coordinates that move no measured marker, locked at the file's value: {', '.join(lock)}."
+            messages.append(note("calibration", words))
+        fixed = [c.name for c in independent_coordinates(source) if c.locked]
+        if fixed:
+            words = f"The file locks {', '.join(fixed)}: held at its values. Unlock there what the person moves."
+            messages.append(note("calibration", words))
+        return lock, estimated_bodies(source, self.options.lightest_share, messages)
+
+
+def _posed(
+    model: _core.Model, source: OpenSimModel, measured: Array, recording: Recording, messages: list[Message]
+) -> PoseFit:
+    """The model laid on the first frame that shows nearly all of the markers (T, M, 3) m, ground frame."""
+    first = first_frame(measured)
+    where = str(recording.path or recording.name)
+    fit = start_posture(model, measured[first], limits=limits_of(source), where=where)
+    text = (
+        f"Start: frame {first + 1} ({recording.time[first]:.2f} s), where the model of {source.path.name} "
+        f"fits the markers to {1000.0 * fit.rms_m:.0f} mm (root mean square)."
+    )
+    messages.append(note("details", text))
+    messages += beyond_range(source, fit.coordinates)
+    return fit
+
+
+def _start(
+    source: OpenSimModel,
+    spec: _core.ModelSpec,
+    markers: Sequence[Marker],
+    how: Calibration,
+    fit_rms_m: float,
+    messages: list[Message],
+) -> tuple[StartingState, JointPrior]:
+    """The state at that frame, and how marker places hang together: as unsure as they fit there (m), too."""
+    bodies, reach = {body.name: body.rigid for body in source.bodies}, reach_of(source)
+    lengths = {parameter.name: 1.0 for parameter in spec.parameters}
+    places = {marker.name: np.array(marker.location) for marker in markers}
+    known = how.priors.changed(marker_sd_m=float(np.hypot(how.priors.marker_sd_m, fit_rms_m / np.sqrt(3.0))))
+    together = places_prior(places, {marker.name: marker.body for marker in markers}, known)
+    prior = state_prior(kinds_of(spec.segments), lengths, {}, places, bodies, reach, known, {})
+    state, said = starting_state(
+        spec,
+        bounds=state_bounds(limits_of(source), lengths, {}, places, bodies, reach, how.bounds, {}),
+        prior=prior | together.sd,
+        table={
+            f"inertia/{s.name}/{k}": v for s in spec.segments for k, v in zip(INERTIA_NAMES, s.inertia, strict=True)
+        },
+        speeds={},
+    )
+    messages += said
+    return state, together
 
 
 def load_opensim(

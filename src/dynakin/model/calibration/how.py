@@ -1,0 +1,42 @@
+"""How a model is calibrated: what is said of it by hand, and what is then found in the recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
+from dynakin.recordings.landmarks import FacingPairs
+from dynakin.recordings.recording import Recording
+from dynakin.settings.model import Bounds, Priors
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """How a model is calibrated on a recording.
+
+    Attributes:
+        side: limb markers of a lumped model: "right", "left", "both" (separate sites), "auto" (fewest gaps, right on a
+            tie).
+        vertical, forward: directions of the laboratory, found in the recording where "auto".
+        priors, bounds: prior standard deviations and half widths of (9).
+        ground: directions of the ground frame, where they are known already. Its origin is replaced by the model's
+            ground landmark.
+    """
+
+    side: str = "auto"
+    vertical: str = "auto"
+    forward: str | tuple[float, float, float] = "auto"
+    priors: Priors = field(default_factory=Priors)
+    bounds: Bounds = field(default_factory=Bounds)
+    ground: GroundFrame | None = None
+
+    def find_ground(
+        self, recording: Recording, pairs: FacingPairs, static: Recording | None, *, floating: bool
+    ) -> GroundFrame:
+        """The ground frame as one of the recordings shows it: the laboratory's own of a model that is floating."""
+        find = find_laboratory_frame if floating else find_ground_frame
+        return find(recording, vertical=self.vertical, forward=self.forward, pairs=pairs, static=static)
+
+
+AUTO = Calibration()
+"""Nothing is said by hand."""
