@@ -53,7 +53,7 @@ def person(model: str) -> Estimator:
 
 
 def ground_of(recording: Recording, estimator: Estimator) -> Ground:
-    return estimator._measured(recording, estimator.start(recording).calibrated)[2]
+    return estimator.measured(recording, estimator.start(recording).calibrated)[2]
 
 
 def with_loads(recording: Recording, factor: np.ndarray) -> Recording:
@@ -78,7 +78,7 @@ def test_plates_that_carry_the_person_are_found_to(model: str, motion: str, seed
     recording = simulate(model, motion, seed, 12.0).recording
     estimator = person(model)
     initial = estimator.start(recording).calibrated
-    markers, wrench, ground = estimator._measured(recording, initial)
+    markers, wrench, ground = estimator.measured(recording, initial)
     found = closure(initial, recording.time, markers, wrench, np.ones(len(wrench), dtype=bool))
     assert found is not None and not found.undeclared.any() and not ground.undeclared.any()
     assert np.sqrt(np.nanmean(found.excess**2, axis=0)).max() < 0.02 * WEIGHT
@@ -96,7 +96,7 @@ def test_without_plates_nothing_is_the_feets_alone_where_they_are_not_under_the_
     feet = [recording.marker_names.index(name) for own in initial.markers_on_feet.values() for name in own]
     markers = recording.markers.copy()
     markers[:, feet] += np.array([away_m, 0.0, 0.0])
-    _, _, ground = estimator._measured(replace(recording.with_plates(()), markers=markers), initial)
+    _, _, ground = estimator.measured(replace(recording.with_plates(()), markers=markers), initial)
     assert (ground.undeclared == borne).all()
     assert any("bears the person beyond both feet" in message.text for message in ground.notes) == borne
 
@@ -107,7 +107,7 @@ def test_a_short_break_in_what_pulls_is_none(break_s: float, pulls: int) -> None
     recording = simulate("sagittal7", "squat", 11, 12.0).recording
     estimator = person("sagittal7")
     initial = estimator.start(recording).calibrated
-    markers, wrench, _ = estimator._measured(recording, initial)
+    markers, wrench, _ = estimator.measured(recording, initial)
     time = recording.time - recording.time[0]
     pulled = (time > 3.0) & (time < 7.0) & ~((time > 5.0) & (time < 5.0 + break_s))
     more = wrench + np.outer(pulled, [0.1 * WEIGHT, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -12,7 +12,7 @@ from dynakin import Estimator, Subject, load_model
 from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.ground.expected import ContactPaths, expected_loads
-from dynakin.filter.samples import Sample, recording_arrays
+from dynakin.filter.samples import Sample, marker_paths, total_wrench
 from dynakin.filter.tracker import Tracker
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import UNMEASURED
@@ -29,7 +29,7 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
     model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
     live = Estimator(model, presets.default().changed(systematic_scale=0.0)).start(recording, lag_s=0.04)
     initial = live.calibrated
-    markers, wrench = recording_arrays(recording, initial)
+    markers, wrench = marker_paths(recording, initial), total_wrench(recording, initial)
     feet = _feet(recording, live)
     for sample, part in zip(_samples(recording), _frames(feet), strict=True):
         now = live.step(sample, part)
@@ -136,7 +136,7 @@ def test_where_plates_are_refused_what_stands_on_them_is_derived() -> None:
 
 def _feet(recording: Recording, live: Tracker) -> ContactLoads:
     """All of the recording seen."""
-    initial, (markers, _) = live.calibrated, recording_arrays(recording, live.calibrated)
+    initial, markers = live.calibrated, marker_paths(recording, live.calibrated)
     loads = foot_loads(recording, initial.ground, initial.foot_markers)
     paths, nothing = ContactPaths.of(initial).at(markers), np.zeros((len(markers), 0), bool)
     return expected_loads(loads, initial, live.noise, paths, np.zeros(len(markers), bool), nothing)

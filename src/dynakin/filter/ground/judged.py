@@ -36,6 +36,7 @@ from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion, pressed_at
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
 from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear, not_zeroed
+from dynakin.filter.samples import total_wrench
 from dynakin.messages import Message, about, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
@@ -72,6 +73,7 @@ class Ground:
             may be out of it still; 0: no farther than usual.
         in_hands_kg: what the plates carry more than the mass, where that is more than they are usually off by: the
             hands may hold it.
+        doubt: a sentence where the plates contradict the mass.
     """
 
     loads: FootLoads | None
@@ -86,6 +88,7 @@ class Ground:
     behind_s: float = 0.0
     clock_sd_s: float = 0.0
     in_hands_kg: float = 0.0
+    doubt: Message | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,10 +104,7 @@ class GroundTrial:
     @cached_property
     def wrench(self) -> Array:
         """(T, 6) N and N m of all plates, ground frame; NaN where one of them is not measured."""
-        if not self.recording.plates:
-            return np.full((self.recording.n_frames, 6), np.nan)
-        total = self.initial.ground.wrench_to_ground(self.recording.total_wrench())
-        return np.where(np.isfinite(total).all(axis=1, keepdims=True), total, np.nan)
+        return total_wrench(self.recording, self.initial, lacking=True)
 
     @cached_property
     def wrenches(self) -> Array:
@@ -252,7 +252,7 @@ class OnGround:
         in_hands_kg = 0.0 if loads is None else more_than_the_mass(initial, judged.load_ratio)
         unseen = [c for c in self._unmeasured if (self.may & ~judged.bears)[:, c].any()]
         held_kg = 0.0 if loads is None else unseen_in_hands(initial, unseen)
-        doubted = doubtful_mass(wrench, initial.weighed_kg, judged.load_ratio, initial.unseen_kg)  # which says it, too
+        doubted = doubtful_mass(initial, initial.weighed_kg + in_hands_kg)  # which says it, too
         if in_hands_kg and not about(notes, "carried") and doubted is None:
             notes.append(note("carried", in_hands_in_words(in_hands_kg)))
         reasons = [*([VERTICAL_ONLY] if shear.unmeasured else []), *judged.reasons]

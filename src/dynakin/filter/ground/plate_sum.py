@@ -233,18 +233,17 @@ def _stands_alone(loads: FootLoads, k: int, frames: slice) -> bool:
     return bool((standing[:, k] & (standing.sum(axis=1) == 1)).mean() > 0.5)
 
 
-def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unseen_kg: float = 0.0) -> Message | None:
-    """Sentences where the plates contradict the mass: by `Ground.load_ratio`, or, where that is not known, by the mean
-    vertical force of the known frames of the wrench (T, 6)."""
-    load = _mean_load_kg(wrench, least=50) if load_ratio is None else load_ratio * mass_kg
-    within = MASS_APART + UNSEEN_APART * unseen_kg / mass_kg
-    if load is None or abs(load - mass_kg) <= within * mass_kg:
+def doubtful_mass(initial: CalibratedModel, load_kg: float) -> Message | None:
+    """Sentences where what the plates carry contradicts the mass."""
+    mass_kg = initial.weighed_kg
+    within = MASS_APART + UNSEEN_APART * initial.unseen_kg / mass_kg
+    if abs(load_kg - mass_kg) <= within * mass_kg:
         return None
-    carried = ", or a load is carried (moments of back and arms are wrong by it)" if load > mass_kg else ""
+    carried = ", or a load is carried (moments of back and arms are wrong by it)" if load_kg > mass_kg else ""
     return warning(
         "weight",
-        f"the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
-        f"({100.0 * abs(load - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
+        f"the plates carry {load_kg:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
+        f"({100.0 * abs(load_kg - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
         f"mass{carried}. Forces, moments and inertia take the error on.",
     )
 
@@ -259,7 +258,7 @@ def _foreign_load(
     """
     mass_kg = initial.weighed_kg
     if initial.feet:
-        load, mean = _mean_load_kg(wrench[claimed], least=1), " on average"
+        load, mean = mean_load_kg(wrench[claimed], least=1), " on average"
     else:
         load, mean = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg, ""
     if tolerance is None or load is None or abs(load - mass_kg) <= tolerance * mass_kg:
@@ -272,7 +271,7 @@ def _foreign_load(
     )
 
 
-def _mean_load_kg(wrench: Array, least: int) -> float | None:
+def mean_load_kg(wrench: Array, least: int) -> float | None:
     """Mean vertical force of the known frames of a wrench (T, 6) as a mass; None of fewer than ``least``."""
     push = wrench[np.isfinite(wrench).all(axis=1), 1]
     return float(push.mean()) / GRAVITY_M_S2 if len(push) >= least else None
