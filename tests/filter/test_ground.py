@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
@@ -22,7 +23,7 @@ from dynakin.filter.ground.closure import closure
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.impossible import impossible
 from dynakin.filter.sight import LiveSight
-from dynakin.filter.sources import with_sources
+from dynakin.filter.sources import ContactSources, with_sources
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import MEASURED as FOOT_MEASURED
@@ -516,6 +517,13 @@ def test_a_recording_too_short_to_judge_is_weighed(frames: int) -> None:
     assert ground.undeclared.all() and any("not used for the total" in text for text in map(str, ground.reasons))
 
 
+def _known(data: xr.Dataset) -> ContactSources:
+    """Of the model whose labels the dataset has; the ground acts on nothing, and all of it is marked."""
+    segments = [str(name) for name in data["joint_segment"].values]
+    moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
+    return ContactSources(segments, data["joint_parent"].values, moved, (), (), np.zeros(len(moved), dtype=bool), ())
+
+
 def test_beside_something_undeclared_a_foot_off_its_plate_is_absent() -> None:
     """Alone it would follow from the motion; with a seat next to it nobody knows what each of them takes."""
     data = make_walker((2,)).data
@@ -523,7 +531,7 @@ def test_beside_something_undeclared_a_foot_off_its_plate_is_absent() -> None:
     feet: Any = SimpleNamespace(contact=data["foot_contact"].values, segments=("foot_r", "foot_l"))
     off = feet.contact[:, 1] == UNMEASURED
     undeclared = off & (data["time"].values > 2.0)
-    found = with_sources(data, feet, undeclared)
+    found = with_sources(data, _known(data), feet, undeclared)
     expected = np.where(undeclared, ABSENT, np.where(off, DERIVED, MEASURED))
     assert 0 < undeclared.sum() < off.sum()
     np.testing.assert_array_equal(foot_sources(found)[:, 1], expected)
@@ -548,7 +556,7 @@ def test_what_nobody_sees_for_longer_than_a_gap_is_absent() -> None:
     hidden = out_of_sight(seen, owners, time)
     np.testing.assert_array_equal(hidden["shank_r"], long)
     feet: Any = SimpleNamespace(contact=np.zeros_like(data["foot_contact"].values), segments=("foot_r", "foot_l"))
-    found = with_sources(data, feet, np.zeros(len(time), dtype=bool), hidden=hidden)
+    found = with_sources(data, _known(data), feet, np.zeros(len(time), dtype=bool), hidden)
     lacking = {segments[k] for k in np.flatnonzero((found["joint_source"].values == ABSENT)[long].all(axis=0))}
     assert lacking == {"shank_r", "foot_r"}
     own = data["coordinate_segment"].values == "shank_r"

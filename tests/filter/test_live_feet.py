@@ -13,12 +13,13 @@ from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.samples import Sample, marker_paths, total_wrench
+from dynakin.filter.sources import ContactSources
 from dynakin.filter.tracker import Tracker
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.metrics import compute_metrics
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, legs_of
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, legs_of
 from dynakin.results.records import REFUSED
 from dynakin.settings import presets
 from dynakin.simulation.trial import simulate
@@ -132,6 +133,24 @@ def test_where_plates_are_refused_what_stands_on_them_is_derived() -> None:
         said.append(live.verdicts[-1] == "refused")  # by the declared noise, so not in all of these frames
         assert (codes == DERIVED).all() == (codes == DERIVED).any() == said[-1]
     assert 60 in np.flatnonzero(said) and not (np.array(said) & ~refused).any()
+
+
+def test_a_session_says_where_moments_come_from_as_the_run_does() -> None:
+    """With a foot off the plates, both, and something undeclared beside one that is."""
+    recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.4)
+    estimator = Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male")))
+    live = estimator.start(recording)
+    feet = _feet(recording, live)
+    contact, known = feet.contact.copy(), feet.known.copy()
+    contact[5:10, 0] = contact[10:15, :2] = contact[15:20, 1:] = UNMEASURED
+    known[15:20] = False
+    feet = replace(feet, contact=contact, known=known)
+    run = estimator.run(recording, feet=lambda _: feet).data
+    assert not (run["verdict"].values[:, -1] == REFUSED).any()
+    steps = [live.step(*both).moment_sources.values for both in zip(_samples(recording), _frames(feet), strict=True)]
+    np.testing.assert_array_equal(steps, run["moment_source"].values)
+    np.testing.assert_array_equal(ContactSources.of(live.calibrated).moments(feet), run["moment_source"].values)
+    assert set(np.unique(steps)) == {MEASURED, DERIVED, PRIOR, ABSENT}
 
 
 def _feet(recording: Recording, live: Tracker) -> ContactLoads:
