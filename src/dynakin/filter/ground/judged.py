@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -111,20 +113,19 @@ def _without_plates(on: OnGround) -> tuple[Ground, Array]:
 def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
     trial, loads, n = on.trial, on.loads, on.trial.recording.n_frames
     recording, initial = trial.recording, trial.initial
-    notes, shear, gains, borne = list[Message](), on.shear, NO_GAINS, np.zeros(on.may.shape[1], dtype=bool)
-    notes += [note("plates", taken_in_words(plate, own)) for plate, own in on.taken.items()]
+    notes = [note("plates", taken_in_words(plate, own)) for plate, own in on.taken.items()]
     wrench = trial.wrench
-    all_of_it, righted = wrench, None
+    all_of_it, righted, plates = wrench, None, PlateErrors(on.shear)
     if on.needed is not None and loads is not None:
         all_of_it = on.all_of_it(on.needed)
         first = judged_by_motion(on, [all_of_it], None) if on.unmeasured else None
-        said, shear, gains, borne = _sensors(on, on.needed, loads, first)
-        notes += said
-        righted = gains.righted(wrench, trial.wrenches)
+        plates = _plate_errors(on, on.needed, loads, first)
+        notes += plates.said
+        righted = plates.gains.righted(wrench, trial.wrenches)
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
-    wrenches = [shear.zeroed(each) for each in (all_of_it, righted) if each is not None]
+    wrenches = [plates.shear.zeroed(each) for each in (all_of_it, righted) if each is not None]
     carries = judged_by_motion(on, wrenches, trial.tolerance)
-    carries = carries._replace(bears=carries.bears | (on.may & borne))
+    carries = carries._replace(bears=carries.bears | (on.may & plates.borne))
     if loads is not None and on.unmeasured:
         loads, low = low_beside_feet(recording, initial, loads, on.places, carries.bears, on.unmeasured)
         carries = carries._replace(bears=carries.bears | low)
@@ -135,7 +136,7 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
     doubted = doubtful_mass(initial, initial.weighed_kg + in_hands_kg)  # which says it, too
     if in_hands_kg and not about(notes, "carried") and doubted is None:
         notes.append(note("carried", in_hands_in_words(in_hands_kg)))
-    reasons = [*([VERTICAL_ONLY] if shear.unmeasured else []), *carries.reasons]
+    reasons = [*([VERTICAL_ONLY] if plates.shear.unmeasured else []), *carries.reasons]
     reasons += [] if loads is None else [said for said in loads.reasons if said not in carries.reasons]
     undeclared = carries.undeclared
     if loads is not None:
@@ -143,54 +144,85 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
         loads = loads.with_borne(np.asarray(carries.bears.any(axis=1))).with_undeclared(undeclared)
         loads = loads.without(carries.beyond)
         reasons += _light_feet(before, loads, carries.beyond)
-    partly = undeclared if loads is None else ~loads.total_known | shear.unmeasured
+    partly = undeclared if loads is None else ~loads.total_known | plates.shear.unmeasured
     wrench = np.where(partly[:, None], np.nan, wrench)
     used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
     if loads is not None or used < n:
         notes.append(note("plates", f"The total wrench is measured in {used} of {n} frames."))
     notes += reasons
     texts = tuple(notes), tuple(reasons)
-    off_gain = None if loads is None or not gains.notes else gains.of_feet(loads)
-    found = Ground(loads, undeclared, carries.bears, used > 0, carries.load_ratio, *texts, shear, off_gain)
+    off_gain = None if loads is None or not plates.gains.notes else plates.gains.of_feet(loads)
+    found = Ground(loads, undeclared, carries.bears, used > 0, carries.load_ratio, *texts, plates.shear, off_gain)
     return replace(found, in_hands_kg=max(in_hands_kg, held_kg)), wrench
 
 
-def _sensors(
-    on: OnGround, needed: Needed, loads: FootLoads, first: Carried | None
-) -> tuple[list[Message], Shear, PlateGains, Flags]:
-    """What the motion says of the rate, of what is carried, or else of the plates' horizontal forces and gains,
-    where no declared contact may bear that bears at all; and (C,) the contacts that it is laid to.
+class PlateErrors(NamedTuple):
+    """What the motion says of the plates' sensors.
+
+    Attributes:
+        shear: by how much their horizontal forces are off. gains: which of them have another gain.
+        said: what there is to say of it, and of the rate and of what is carried, which look like it.
+        borne: (C,) declared contacts that it is laid to instead; False: none.
+    """
+
+    shear: Shear
+    gains: PlateGains = NO_GAINS
+    said: Sequence[Message] = ()
+    borne: Flags | Literal[False] = False
+
+
+def _plate_errors(on: OnGround, needed: Needed, loads: FootLoads, first: Carried | None) -> PlateErrors:
+    """Where no declared contact may bear that bears at all.
 
     Args:
         first: what is known if all that the plates lack is the declared contacts'; None where none is declared.
     """
-    initial, recording = on.trial.initial, on.trial.recording
     bears = np.zeros_like(on.may) if first is None else first.bears & loads.total_known[:, None]
     free: Flags = np.asarray(~(on.may & bears.any(axis=0)).any(axis=1))
-    touched = np.array([name != SEAT for name in initial.contacts], dtype=bool) & on.may[free].any(axis=0)
-    nobody = np.zeros_like(touched)
+    touched = np.array([name != SEAT for name in on.trial.initial.contacts], dtype=bool) & on.may[free].any(axis=0)
     total = np.where(free[:, None], on.total(loads, needed), np.nan)
+    if (found := _rate_or_load(on, needed, total, touched)) is not None:
+        return found
+    if on.shear.unmeasured:
+        return PlateErrors(on.shear)
+    found = _shear(on, needed, loads, first, total, touched)
+    if np.any(found.borne):
+        return found
+    gains = _gains(on, needed, loads, free, first)
+    return PlateErrors(found.shear, gains, [*found.shear.notes, *gains.notes])
+
+
+def _rate_or_load(on: OnGround, needed: Needed, total: Array, touched: Flags) -> PlateErrors | None:
+    """Where the force (T, 3) changes as with another rate of the markers, or a load in the hands, or as what the
+    declared contacts ``touched`` (C,) bear: then no more can be said of the plates. None where it does not."""
+    initial, recording = on.trial.initial, on.trial.recording
     found = fitting_rate(needed, total)
     if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
-        return [warning("rate", wrong_rate_in_words(needed.rate, *found))], on.shear, NO_GAINS, nobody
-    if (load_kg := carried_in_hands(needed, initial, on.trial.markers, total)) is not None:
-        if not touched.any():
-            return [warning("carried", carried_in_words(load_kg))], on.shear, NO_GAINS, nobody
-        load = f"The plates' force changes as if about {load_kg:.0f} kg were carried in the hands"
-        return [note("carried", held_in_words(load, initial, touched))], on.shear, NO_GAINS, touched
-    if on.shear.unmeasured:
-        return [], on.shear, NO_GAINS, nobody
+        return PlateErrors(on.shear, said=[warning("rate", wrong_rate_in_words(needed.rate, *found))])
+    if (load_kg := carried_in_hands(needed, initial, on.trial.markers, total)) is None:
+        return None
+    if not touched.any():
+        return PlateErrors(on.shear, said=[warning("carried", carried_in_words(load_kg))])
+    load = f"The plates' force changes as if about {load_kg:.0f} kg were carried in the hands"
+    return PlateErrors(on.shear, said=[note("carried", held_in_words(load, initial, touched))], borne=touched)
+
+
+def _shear(
+    on: OnGround, needed: Needed, loads: FootLoads, first: Carried | None, total: Array, touched: Flags
+) -> PlateErrors:
+    """By how much the horizontal forces of the total (T, 3) are off, or the contacts ``touched`` (C,) that it is laid
+    to."""
     shear = found_shear(needed, total)
-    if first is not None and first.found is not None:
-        whole = found_shear(needed, on.total(loads, needed))
-        near = acts_at(first.found, loads.total_known, pressed_at(on.trial.wrench), on.places, mean=True)
-        if any(whole.zero) and near < AT_PLATE:
-            shear = whole  # the plates', whoever is declared
-        elif any(shear.zero) and touched.any():
-            said = [note("zero", held_in_words(not_zeroed(*shear.zero, needed.weight), initial, touched))]
-            return said, NO_SHEAR if near * AT_PLATE > 1.0 else replace(shear, notes=()), NO_GAINS, touched
-    gains = _gains(on, needed, loads, free, first)
-    return [*shear.notes, *gains.notes], shear, gains, nobody
+    if first is None or first.found is None:
+        return PlateErrors(shear)
+    whole = found_shear(needed, on.total(loads, needed))
+    near = acts_at(first.found, loads.total_known, pressed_at(on.trial.wrench), on.places, mean=True)
+    if any(whole.zero) and near < AT_PLATE:
+        return PlateErrors(whole)  # the plates', whoever is declared
+    if not (any(shear.zero) and touched.any()):
+        return PlateErrors(shear)
+    said = [note("zero", held_in_words(not_zeroed(*shear.zero, needed.weight), on.trial.initial, touched))]
+    return PlateErrors(NO_SHEAR if near * AT_PLATE > 1.0 else replace(shear, notes=()), said=said, borne=touched)
 
 
 def _gains(on: OnGround, needed: Needed, loads: FootLoads, free: Flags, first: Carried | None) -> PlateGains:
