@@ -19,7 +19,7 @@ from live_latency import RATE_HZ, fullbody, planar, resident_kb, there_and_back
 from dynakin.bindings import _core
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.samples import recording_arrays
+from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.settings.presets import preset
 
 
@@ -43,7 +43,7 @@ def main() -> None:
     tracker = estimator.start(recording, rate_hz=RATE_HZ)
     if asked.preset != "default":
         tracker = Estimator(estimator.model, noise=preset(asked.preset)).start(recording, rate_hz=RATE_HZ)
-    markers, wrench = recording_arrays(recording, tracker.calibrated)
+    markers, wrench = marker_paths(recording, tracker.calibrated), total_wrench(recording, tracker.calibrated)
     _, model, kalman = core_filter(tracker.calibrated, tracker.noise, tracker.estimate)
     first, size = model.layout.blocks["lengths"][0], model.layout.size
     sd0 = np.sqrt(np.diag(kalman.covariance))

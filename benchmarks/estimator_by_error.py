@@ -17,7 +17,7 @@ from itertools import repeat
 import numpy as np
 
 import dynakin
-from dynakin.filter.samples import recording_arrays
+from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_names
 from dynakin.settings import presets
@@ -105,7 +105,7 @@ def one_trial(model: str, seed: int, duration: float, changes: dict[str, float])
         tracker = estimator.start(off_by(estimator.start(trial.recording).calibrated, seed))
         initial = tracker.calibrated
         names = tuple(free_names(initial.spec))
-        measured = recording_arrays(trial.recording, initial)
+        measured = marker_paths(trial.recording, initial), total_wrench(trial.recording, initial)
         arrays = tracker.run_arrays(trial.recording.time, *measured)
         found.append(figures(name, blocks(arrays, initial), trial, names))
         if name == "default":

@@ -22,7 +22,7 @@ from peers_times import times
 import dynakin
 from dynakin.arrays import rms, wrench_about
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.samples import recording_arrays
+from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.model.definition import Definition, load_model
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.recordings.formats.mot import read_table
@@ -70,7 +70,8 @@ def filtered(estimate: tuple[str, ...], *, smooth: bool = False) -> tuple[float,
     definition = load_opensim(FILE, Subject(mass_kg=MASS["squats1"]))
     estimator = dynakin.Estimator(definition, without_plates(), estimate=estimate)
     tracker = estimator.start(recording)
-    markers, wrench = recording_arrays(recording, tracker.calibrated, gaps=True)
+    markers = marker_paths(recording, tracker.calibrated, gaps=True)
+    wrench = total_wrench(recording, tracker.calibrated, gaps=True)
     wrench[:] = np.nan
     run = tracker.run_smoothed_arrays if smooth else tracker.run_arrays
     return distance_mm(markers, run(recording.time, markers, wrench)["markers_estimated"]), markers

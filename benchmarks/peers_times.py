@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from opensim_peer import inverse_kinematics, load, without_patellae
 
 import dynakin
-from dynakin.filter.samples import recording_arrays
+from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.settings.subject import Subject
 
@@ -28,7 +28,7 @@ def steps(file: Path, data: Path, mass: float, kinds: tuple[str, ...], plates: b
     estimator = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass)), noise, estimate=kinds)
     tracker = estimator.start(recording)
     initial = tracker.calibrated
-    markers, wrench = recording_arrays(recording, initial, gaps=True)
+    markers, wrench = marker_paths(recording, initial, gaps=True), total_wrench(recording, initial, gaps=True)
     if not plates:
         wrench[:] = np.nan
     found = []

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import dynakin
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.core_filter import filter_settings
-from dynakin.filter.samples import recording_arrays
+from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import Definition
 from dynakin.simulation.trial import simulate_squat
@@ -107,7 +107,7 @@ def main() -> None:
             estimator = dynakin.Estimator(dynakin.load_model(name, subject=subject, markers="opencap"), noise)
             tracker = estimator.start(recording)
             initial, model = tracker.calibrated, tracker.core_model
-            markers, wrench = recording_arrays(recording, initial)
+            markers, wrench = marker_paths(recording, initial), total_wrench(recording, initial)
             rows = int(sum(sum(m.measured) for m in initial.spec.markers) + sum(initial.spec.wrench_measured))
             rows += noise.total_mass_use == "frame"
             settings, P0 = filter_settings(initial, noise, model.layout), initial_covariance(initial, noise)

@@ -23,12 +23,13 @@ from simulated import judged
 import dynakin
 from dynakin.arrays import wrench_about
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.samples import marker_paths
 from dynakin.identification.subject import identify_subject
 from dynakin.identification.trials import Common, MeasuredTrial, Movement
 from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.recording import Recording
 from dynakin.units import COMPONENTS
-from dynakin.validation.held_out import halves, marker_paths
+from dynakin.validation.held_out import halves
 
 Array = np.ndarray
 DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", "../shared/data")) / "opencap_subject4"
@@ -45,7 +46,7 @@ def product(
     recording = replace(recording, plates=())
     tracker = estimator.start(recording, static=static)
     initial = tracker.calibrated
-    markers = marker_paths(recording, initial, initial.ground)
+    markers = marker_paths(recording, initial, lacking=True)
     arrays = tracker.run_smoothed_arrays(recording.time, markers, np.full((recording.n_frames, 6), np.nan))
     return arrays["wrench_estimated"]
 

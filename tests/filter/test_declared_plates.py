@@ -11,7 +11,7 @@ import pytest
 import dynakin
 from dynakin.filter.ground.declared import low_beside_feet, plates_of_their_own
 from dynakin.filter.ground.expected import ContactPaths, expected_loads
-from dynakin.filter.samples import recording_arrays
+from dynakin.filter.samples import marker_paths
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import ON_PLATE, SHARED_PLATE
@@ -32,7 +32,7 @@ def by_hands() -> tuple[Recording, dynakin.CalibratedModel, np.ndarray, FootLoad
     """A squat whose hands are declared: markers, and its feet's loads."""
     squat = simulate("fullbody", "squat", 3, 6.0, 50.0, 70.0, 1.75, "male").recording
     initial = dynakin.Estimator(person(), contacts=HANDS).calibrate(squat)
-    markers, _ = recording_arrays(squat, initial, gaps=True)
+    markers = marker_paths(squat, initial, gaps=True)
     loads = foot_loads(squat, initial.ground, initial.foot_markers, others=HANDS)
     return squat, initial, ContactPaths.of(initial).at(markers), loads
 

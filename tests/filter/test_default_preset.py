@@ -9,7 +9,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError
-from dynakin.filter.samples import recording_arrays
+from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.messages import about
 from dynakin.pipeline.result import Result
 from dynakin.report.insights import insights
@@ -119,7 +119,8 @@ def test_the_delayed_frame_is_the_smoothers_of_what_was_seen(trial: SimulatedTri
         assert (delayed is None) == (sample.time_s < 0.15 - 1e-9)
     assert delayed is not None and delayed.time_s == pytest.approx(now.time_s - 0.15)
     offline = estimator().start(trial.recording)
-    markers, wrench = recording_arrays(trial.recording, offline.calibrated)
+    markers = marker_paths(trial.recording, offline.calibrated)
+    wrench = total_wrench(trial.recording, offline.calibrated)
     arrays = offline.run_smoothed_arrays(trial.recording.time[:120], markers[:120], wrench[:120])
     np.testing.assert_allclose(delayed.speeds, arrays["state"][104, 7:14], atol=1e-8)
     with pytest.raises(ConfigError, match=r"expected Estimator\.start\(\.\.\., lag_s=SECONDS\)"):

@@ -200,7 +200,7 @@ def test_a_marker_far_beyond_all_numbers_is_divergence_at_its_frame(trial: Simul
 
     filtering = estimator(noise=dynakin.presets.paper())
     tracker = filtering.start(trial.recording)
-    markers, wrench = filtering.measured(trial.recording, tracker.calibrated)
+    markers, wrench, _ = filtering.measured(trial.recording, tracker.calibrated)
     markers[250, tracker.calibrated.recorded_markers.index("r_knee")] = 1e200
     with pytest.raises(DivergenceError, match=r"diverged at frame 250 \(2\.500000 s\)"):
         tracker.run_arrays(trial.recording.time, markers, wrench)

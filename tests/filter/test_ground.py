@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
@@ -22,7 +23,7 @@ from dynakin.filter.ground.closure import closure
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.impossible import impossible
 from dynakin.filter.sight import LiveSight
-from dynakin.filter.sources import with_sources
+from dynakin.filter.sources import ContactSources, with_sources
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import MEASURED as FOOT_MEASURED
@@ -34,6 +35,7 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.report.insights import insights
+from dynakin.results.estimate import tree_of
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, out_of_sight, taken_back, wrench_sources
@@ -53,7 +55,7 @@ def person(model: str) -> Estimator:
 
 
 def ground_of(recording: Recording, estimator: Estimator) -> Ground:
-    return estimator._measured(recording, estimator.start(recording).calibrated)[2]
+    return estimator.measured(recording, estimator.start(recording).calibrated)[2]
 
 
 def with_loads(recording: Recording, factor: np.ndarray) -> Recording:
@@ -78,7 +80,7 @@ def test_plates_that_carry_the_person_are_found_to(model: str, motion: str, seed
     recording = simulate(model, motion, seed, 12.0).recording
     estimator = person(model)
     initial = estimator.start(recording).calibrated
-    markers, wrench, ground = estimator._measured(recording, initial)
+    markers, wrench, ground = estimator.measured(recording, initial)
     found = closure(initial, recording.time, markers, wrench, np.ones(len(wrench), dtype=bool))
     assert found is not None and not found.undeclared.any() and not ground.undeclared.any()
     assert np.sqrt(np.nanmean(found.excess**2, axis=0)).max() < 0.02 * WEIGHT
@@ -96,7 +98,7 @@ def test_without_plates_nothing_is_the_feets_alone_where_they_are_not_under_the_
     feet = [recording.marker_names.index(name) for own in initial.foot_markers.values() for name in own]
     markers = recording.markers.copy()
     markers[:, feet] += np.array([away_m, 0.0, 0.0])
-    _, _, ground = estimator._measured(replace(recording.with_plates(()), markers=markers), initial)
+    _, _, ground = estimator.measured(replace(recording.with_plates(()), markers=markers), initial)
     assert (ground.undeclared == borne).all()
     assert any("bears the person beyond both feet" in message.text for message in ground.notes) == borne
 
@@ -107,7 +109,7 @@ def test_a_short_break_in_what_pulls_is_none(break_s: float, pulls: int) -> None
     recording = simulate("sagittal7", "squat", 11, 12.0).recording
     estimator = person("sagittal7")
     initial = estimator.start(recording).calibrated
-    markers, wrench, _ = estimator._measured(recording, initial)
+    markers, wrench, _ = estimator.measured(recording, initial)
     time = recording.time - recording.time[0]
     pulled = (time > 3.0) & (time < 7.0) & ~((time > 5.0) & (time < 5.0 + break_s))
     more = wrench + np.outer(pulled, [0.1 * WEIGHT, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -516,6 +518,13 @@ def test_a_recording_too_short_to_judge_is_weighed(frames: int) -> None:
     assert ground.undeclared.all() and any("not used for the total" in text for text in map(str, ground.reasons))
 
 
+def _known(data: xr.Dataset) -> ContactSources:
+    """Of the model whose labels the dataset has; the ground acts on nothing, and all of it is marked."""
+    segments = [str(name) for name in data["joint_segment"].values]
+    moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
+    return ContactSources(tree_of(data), moved, (), (), np.zeros(len(moved), dtype=bool), ())
+
+
 def test_beside_something_undeclared_a_foot_off_its_plate_is_absent() -> None:
     """Alone it would follow from the motion; with a seat next to it nobody knows what each of them takes."""
     data = make_walker((2,)).data
@@ -523,7 +532,7 @@ def test_beside_something_undeclared_a_foot_off_its_plate_is_absent() -> None:
     feet: Any = SimpleNamespace(contact=data["foot_contact"].values, segments=("foot_r", "foot_l"))
     off = feet.contact[:, 1] == UNMEASURED
     undeclared = off & (data["time"].values > 2.0)
-    found = with_sources(data, feet, undeclared)
+    found = with_sources(data, _known(data), feet, undeclared)
     expected = np.where(undeclared, ABSENT, np.where(off, DERIVED, MEASURED))
     assert 0 < undeclared.sum() < off.sum()
     np.testing.assert_array_equal(foot_sources(found)[:, 1], expected)
@@ -548,7 +557,7 @@ def test_what_nobody_sees_for_longer_than_a_gap_is_absent() -> None:
     hidden = out_of_sight(seen, owners, time)
     np.testing.assert_array_equal(hidden["shank_r"], long)
     feet: Any = SimpleNamespace(contact=np.zeros_like(data["foot_contact"].values), segments=("foot_r", "foot_l"))
-    found = with_sources(data, feet, np.zeros(len(time), dtype=bool), hidden=hidden)
+    found = with_sources(data, _known(data), feet, np.zeros(len(time), dtype=bool), hidden)
     lacking = {segments[k] for k in np.flatnonzero((found["joint_source"].values == ABSENT)[long].all(axis=0))}
     assert lacking == {"shank_r", "foot_r"}
     own = data["coordinate_segment"].values == "shank_r"

@@ -12,13 +12,14 @@ from dynakin import Estimator, Subject, load_model
 from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.ground.expected import ContactPaths, expected_loads
-from dynakin.filter.samples import Sample, recording_arrays
+from dynakin.filter.samples import Sample, marker_paths, total_wrench
+from dynakin.filter.sources import ContactSources
 from dynakin.filter.tracker import Tracker
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.metrics import compute_metrics
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, legs_of
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, legs_of
 from dynakin.results.records import REFUSED
 from dynakin.settings import presets
 from dynakin.simulation.trial import simulate
@@ -29,7 +30,7 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
     model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
     live = Estimator(model, presets.default().changed(systematic_scale=0.0)).start(recording, lag_s=0.04)
     initial = live.calibrated
-    markers, wrench = recording_arrays(recording, initial)
+    markers, wrench = marker_paths(recording, initial), total_wrench(recording, initial)
     feet = _feet(recording, live)
     for sample, part in zip(_samples(recording), _frames(feet), strict=True):
         now = live.step(sample, part)
@@ -134,9 +135,27 @@ def test_where_plates_are_refused_what_stands_on_them_is_derived() -> None:
     assert 60 in np.flatnonzero(said) and not (np.array(said) & ~refused).any()
 
 
+def test_a_session_says_where_moments_come_from_as_the_run_does() -> None:
+    """With a foot off the plates, both, and something undeclared beside one that is."""
+    recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.4)
+    estimator = Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male")))
+    live = estimator.start(recording)
+    feet = _feet(recording, live)
+    contact, known = feet.contact.copy(), feet.known.copy()
+    contact[5:10, 0] = contact[10:15, :2] = contact[15:20, 1:] = UNMEASURED
+    known[15:20] = False
+    feet = replace(feet, contact=contact, known=known)
+    run = estimator.run(recording, feet=lambda _: feet).data
+    assert not (run["verdict"].values[:, -1] == REFUSED).any()
+    steps = [live.step(*both).moment_sources.values for both in zip(_samples(recording), _frames(feet), strict=True)]
+    np.testing.assert_array_equal(steps, run["moment_source"].values)
+    np.testing.assert_array_equal(ContactSources.of(live.calibrated).moments(feet), run["moment_source"].values)
+    assert set(np.unique(steps)) == {MEASURED, DERIVED, PRIOR, ABSENT}
+
+
 def _feet(recording: Recording, live: Tracker) -> ContactLoads:
     """All of the recording seen."""
-    initial, (markers, _) = live.calibrated, recording_arrays(recording, live.calibrated)
+    initial, markers = live.calibrated, marker_paths(recording, live.calibrated)
     loads = foot_loads(recording, initial.ground, initial.foot_markers)
     paths, nothing = ContactPaths.of(initial).at(markers), np.zeros((len(markers), 0), bool)
     return expected_loads(loads, initial, live.noise, paths, np.zeros(len(markers), bool), nothing)

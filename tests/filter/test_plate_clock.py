@@ -14,7 +14,7 @@ from dynakin import Estimator, Subject, load_model
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.fine_delay import MODEL_S, PRIOR_S, clock_delay
 from dynakin.filter.prepared import Prepared
-from dynakin.filter.samples import recording_arrays
+from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.messages import about
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate as simulate_anew
@@ -32,7 +32,7 @@ def prepared() -> Prepared:
 
 
 def delay_of(recording: Recording, ready: Prepared) -> Delay | None:
-    markers, wrench = recording_arrays(recording, ready.calibrated)
+    markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     known = np.isfinite(ready.wrench).all(axis=1, keepdims=True)
     return clock_delay(ready.calibrated, recording.time, markers, np.where(known, wrench, np.nan))
 
@@ -55,7 +55,7 @@ def test_who_stands_shows_no_delay() -> None:
 
 def test_nothing_is_said_where_forces_are_missing_or_frames_are_few() -> None:
     ready, recording = prepared(), simulate("fullbody", "gait", 7, 4.0).recording
-    markers, wrench = recording_arrays(recording, ready.calibrated)
+    markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     held = replace(ready.calibrated, contacts={"seat": "pelvis"})
     assert clock_delay(held, recording.time, markers, wrench) is None
     assert clock_delay(ready.calibrated, recording.time, markers, np.full_like(wrench, np.nan)) is None
@@ -159,7 +159,7 @@ def test_a_real_squat_shows_a_clock_that_drifts_and_none_that_does_not(data_dir:
 
 def test_no_drift_is_asked_for_where_a_load_that_moves_looks_like_one() -> None:
     ready, recording = prepared(), drifting(simulate("fullbody", "gait", 7, 4.0).recording, 0.03)
-    markers, wrench = recording_arrays(recording, ready.calibrated)
+    markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     known = np.where(np.isfinite(ready.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     asked, not_asked = (
         clock_delay(ready.calibrated, recording.time, markers, known, drifts) for drifts in (True, False)
@@ -170,7 +170,7 @@ def test_no_drift_is_asked_for_where_a_load_that_moves_looks_like_one() -> None:
 def test_who_lands_shows_no_few_milliseconds() -> None:
     """Flesh follows later than bones."""
     ready, recording = prepared(), simulate("fullbody", "gait", 7, 4.0).recording
-    markers, wrench = recording_arrays(recording, ready.calibrated)
+    markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     wrench = np.where(np.isfinite(ready.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     known = np.flatnonzero(np.isfinite(wrench[:, 1]))
     wrench[known[-1], 1] = 2.5 * 70.0 * 9.81
@@ -182,7 +182,7 @@ def test_short_gaps_hide_no_delay() -> None:
     ready, recording = prepared(), brought_into_step(simulate("fullbody", "gait", 7, 4.0).recording, Delay(-0.01, 0.0))
     whole = delay_of(recording, ready)
     assert whole is not None
-    markers, wrench = recording_arrays(recording, ready.calibrated)
+    markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     wrench = np.where(np.isfinite(ready.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     gap = np.isin(np.arange(recording.n_frames) % 60, [40, 41, 42])
     blank = np.where(gap[:, None, None], np.nan, markers), np.where(gap[:, None], np.nan, wrench)

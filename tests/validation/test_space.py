@@ -47,7 +47,7 @@ def known(walk: Recording, initial: CalibratedModel) -> np.ndarray:
 def test_one_mask_feeds_and_judges(
     walk: Recording, estimator: Estimator, initial: CalibratedModel, known: np.ndarray
 ) -> None:
-    _, fed = estimator.measured(walk, initial)
+    _, fed, _ = estimator.measured(walk, initial)
     for wrench in (fed, measured_wrench(walk, initial)[0], prepare(walk, estimator).wrench):
         assert np.array_equal(np.isfinite(wrench).all(axis=1), known)
 

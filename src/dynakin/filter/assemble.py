@@ -18,8 +18,8 @@ from dynakin.filter.impossible import impossible, impossible_in_words
 from dynakin.filter.labels import labels
 from dynakin.filter.noise import limit_sd, prior_factor
 from dynakin.filter.parameters import parameters_of
-from dynakin.filter.sight import hidden_segments, owners_of
-from dynakin.filter.sources import with_sources
+from dynakin.filter.sight import hidden_segments
+from dynakin.filter.sources import ContactSources, with_sources
 from dynakin.filter.systematic import Systematic
 from dynakin.filter.taken import with_taken
 from dynakin.messages import Message, note, warning
@@ -92,13 +92,10 @@ def assemble(
         notes = [*notes, refused]
     data = with_sources(
         whole,
+        ContactSources.of(initial),
         feet,
         np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared,
-        initial.feet.values(),
-        initial.held,
-        initial.unmarked_feet.values(),
         hidden_segments(model, arrays["state"], measured[0], recording.time, arrays["verdicts"]),
-        owners_of(initial.spec),
         beyond,
         says_carried(notes),
     )

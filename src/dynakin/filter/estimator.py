@@ -20,9 +20,8 @@ from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.ground.known import known_ground
 from dynakin.filter.ground.place import off_place
-from dynakin.filter.ground.plate_sum import doubtful_mass
 from dynakin.filter.prepared import Prepared
-from dynakin.filter.samples import in_step, recording_arrays
+from dynakin.filter.samples import in_step, marker_paths, total_wrench
 from dynakin.filter.skin import following_skin, may_follow, skin_found
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import note
@@ -249,7 +248,7 @@ class Estimator:
         if problem:
             raise RecordingError(f"{recording.path or recording.name}: {problem}")
         calibrated = self.calibrate(recording, static=static)
-        markers, wrench, ground = self._measured(recording, calibrated)
+        markers, wrench, ground = self.measured(recording, calibrated)
         tracker = Tracker(calibrated, self.noise, self.estimate)
         calibrated = tracker.calibrated
         contacts = None
@@ -267,8 +266,7 @@ class Estimator:
                 ground.shear,
                 ground.off_gain,
             )
-        doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio, calibrated.unseen_kg)
-        return Prepared(recording, tracker, markers, wrench, ground, contacts, lag_s, doubt, tuple(unsmoothed))
+        return Prepared(recording, tracker, markers, wrench, ground, contacts, lag_s, tuple(unsmoothed))
 
     @one_blas_thread
     def follow(self, ready: Prepared, progress: Progress | None = None) -> Tracked:
@@ -292,7 +290,7 @@ class Estimator:
             again = min(frames, round(CALIBRATED_S * recording.rate)) if adapt else 0
             shares = (ways * frames, 0, 0) if once else (shown, again, ways * frames)
             there, calibrating, back = _shares(progress, shares)
-            passes = 0 if ready.doubt else PASSES
+            passes = 0 if ground.doubt else PASSES
 
             def first(own: Tracker, *trial: Any) -> dict[str, Array]:
                 return own.run_late_arrays(late, *trial) if once else own.run_arrays(*trial, state_only=True)
@@ -320,13 +318,13 @@ class Estimator:
         found_of = {"reasons": [reason.text for reason in ground.reasons], "plates_behind_s": ground.behind_s}
         config = self.settings() | {"lag_s": lag_s, "ground": found_of}
         doubt = clock if ground.usable else []
-        if ready.doubt:
+        if ground.doubt:
             unsought = " No further delay of the plates is sought, because a wrong mass looks like one."
-            doubt = [replace(ready.doubt, text=ready.doubt.text + unsought * (not calibrated.feet))]
+            doubt = [replace(ground.doubt, text=ground.doubt.text + unsought * (not calibrated.feet))]
         config["noise_used"] = tracker.noise.scales()
         notes += [*doubt, *ready.unsmoothed]
         plates = [plate.name for plate in recording.plates]
-        if not ready.doubt:
+        if not ground.doubt:
             place = off_place(ground, calibrated, tracker.core_model, arrays["state"], wrench, plates)
             notes += [place] if place else []
         if tracker.systematic is not None:
@@ -341,21 +339,18 @@ class Estimator:
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)
 
-    def _measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array, Ground]:
-        markers, _ = recording_arrays(recording, calibrated, gaps=self.noise.recover)
-        tolerance = self.noise.plate_load_tolerance
-        ground, known = known_ground(recording, calibrated, markers, self.plates, tolerance)
-        return markers, known, ground
-
-    def measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array]:
+    def measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array, Ground]:
         """What the filter takes of a recording: markers (T, M, 3) m, and wrench (T, 6), NaN where it is not known (all
-        of it where the plates carry something that the model does not have).
+        of it where the plates carry something that the model does not have); and what is known of the ground.
 
         Raises:
             RecordingError: markers or plates do not fit the model.
         """
-        markers, wrench, _ = self._measured(recording, calibrated)
-        return markers, wrench
+        total_wrench(recording, calibrated, gaps=self.noise.recover)  # refuses what the filter cannot take
+        markers = marker_paths(recording, calibrated, gaps=self.noise.recover)
+        tolerance = self.noise.plate_load_tolerance
+        ground, wrench = known_ground(recording, calibrated, markers, self.plates, tolerance)
+        return markers, wrench, ground
 
     def settings(self) -> dict[str, object]:
         """What was asked for, as plain data: written into the outputs."""

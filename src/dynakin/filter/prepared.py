@@ -35,7 +35,7 @@ class Prepared:
         ground: what is known of the ground reaction. contacts: the wrench of each contact; None of a model that stands
             on its root.
         lag_s: each frame is to be estimated from the frames until so much later; inf: from all.
-        doubt: a sentence where the plates contradict the mass. unsmoothed: one where there is no smoother.
+        unsmoothed: a sentence where there is no smoother.
     """
 
     recording: Recording
@@ -45,7 +45,6 @@ class Prepared:
     ground: Ground
     contacts: ContactLoads | None
     lag_s: float
-    doubt: Message | None
     unsmoothed: tuple[Message, ...]
 
     @property
@@ -56,7 +55,7 @@ class Prepared:
     @property
     def messages(self) -> list[Message]:
         """What there is to say of the recording, the model and the plates, in the words of a run."""
-        doubt = [self.doubt] if self.doubt else []
+        doubt = [self.ground.doubt] if self.ground.doubt else []
         return [*self.recording.notes, *self.calibrated.messages, *self.ground.notes, *doubt, *self.unsmoothed]
 
     def undeclared(self, contacts: ContactLoads | None) -> Flags:

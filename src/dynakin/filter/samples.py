@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.limits import FARTHEST_M, LARGEST_MOMENT_NM
 from dynakin.recordings.recording import Recording
 
@@ -44,46 +45,68 @@ class Sample:
                 )
 
 
-def recording_arrays(recording: Recording, initial: CalibratedModel, *, gaps: bool = False) -> tuple[Array, Array]:
-    """Markers (T, M, 3) m and total wrench (T, 6) about the model's ground origin, ground frame, NaN missing.
+def marker_paths(
+    recording: Recording,
+    initial: CalibratedModel,
+    ground: GroundFrame | None = None,
+    *,
+    gaps: bool = False,
+    lacking: bool = False,
+) -> Array:
+    """Paths (T, M, 3) m of the model's markers, ground frame, NaN missing.
 
     Args:
-        gaps: whether frames without any marker, and plates that drop out (NaN), are ridden through.
+        ground: another than the model's own.
+        gaps: whether frames without any marker are ridden through. lacking: whether the recording may lack markers of
+            the model, or show none.
 
     Raises:
-        RecordingError: no plates, a marker of the model that is not in the recording; without ``gaps`` a frame without
-            any of its markers, or a wrench that is not finite.
+        RecordingError: without ``lacking`` a marker of the model that is not in the recording, or none in any frame;
+            without both a frame without any.
     """
-    where = recording.path or recording.name
-    if not recording.plates and not initial.feet:
-        raise RecordingError(
-            f"{where}: no force plates, expected at least one: the wrench is a measurement of this filter "
-            "(a force file can be given with the markers)"
-        )
-    markers = initial.ground.points_to_ground(
-        np.stack([recording.marker(name) for name in initial.recorded_markers], axis=1)
-    )
+    names, missing = recording.marker_names, np.full((recording.n_frames, 3), np.nan)
+    paths = [missing if lacking and name not in names else recording.marker(name) for name in initial.recorded_markers]
+    markers = (ground or initial.ground).points_to_ground(np.stack(paths, axis=1))
     seen = np.isfinite(markers).all(axis=2)
     blind = np.flatnonzero(np.count_nonzero(seen, axis=1) == 0)
-    if len(blind) and (not gaps or not seen.any()):
+    if len(blind) and not lacking and (not gaps or not seen.any()):
         k = int(blind[0])
         raise RecordingError(
-            f"{where}: frame {k + 1} ({recording.time[k]:.3f} s) has none of the model's {seen.shape[1]} markers, "
-            f"expected at least one ({len(blind)} such frame{'s' if len(blind) > 1 else ''})"
+            f"{recording.path or recording.name}: frame {k + 1} ({recording.time[k]:.3f} s) has none of the model's "
+            f"{seen.shape[1]} markers, expected at least one ({len(blind)} such frame{'s' if len(blind) > 1 else ''})"
         )
-    if not recording.plates:  # a floating model needs none: all rows of the wrench are left out
-        return np.ascontiguousarray(markers), np.full((recording.n_frames, 6), np.nan)
+    return np.ascontiguousarray(markers)
+
+
+def total_wrench(recording: Recording, initial: CalibratedModel, *, gaps: bool = False, lacking: bool = False) -> Array:
+    """What all plates measure together (T, 6) N and N m, about the model's ground origin, ground frame; NaN where one
+    of them is not measured.
+
+    Args:
+        gaps: whether plates that drop out (NaN) are ridden through. lacking: whether there may be no plates, or none
+            that ever measure; a floating model needs none.
+
+    Raises:
+        RecordingError: without ``lacking`` no plates, or no frame of theirs; without both a frame that is not measured.
+    """
+    lacking = lacking or bool(initial.feet)
+    if not recording.plates and not lacking:
+        raise RecordingError(
+            f"{recording.path or recording.name}: no force plates, expected at least one: the wrench is a measurement "
+            "of this filter (a force file can be given with the markers)"
+        )
+    if not recording.plates:
+        return np.full((recording.n_frames, 6), np.nan)
     wrench = initial.ground.wrench_to_ground(recording.total_wrench())
     bad = np.flatnonzero(~np.isfinite(wrench).all(axis=1))
-    if len(bad) and (initial.feet or (gaps and len(bad) < len(wrench))):
-        wrench[bad] = np.nan
-    elif len(bad):
+    if len(bad) and not lacking and (not gaps or len(bad) == len(wrench)):
         k = int(bad[0])
         raise RecordingError(
             f"{recording.plates_file}: the plates' wrench at frame {k + 1} ({recording.time[k]:.3f} s) is {wrench[k]}, "
             f"expected numbers ({len(bad)} such frame{'s' if len(bad) > 1 else ''})"
         )
-    return np.ascontiguousarray(markers), np.ascontiguousarray(wrench)
+    wrench[bad] = np.nan
+    return np.ascontiguousarray(wrench)
 
 
 def in_step(time: Array, wrench: Array, delay_s: float | Array) -> Array:

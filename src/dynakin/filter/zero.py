@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from dynakin.errors import RecordingError
-from dynakin.filter.samples import recording_arrays
+from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.declared import with_loads
 from dynakin.model.schema import kinds_of
@@ -73,10 +73,8 @@ def _estimated_anew(estimator: Estimator, estimate: Estimate, standing: Recordin
     tracker = estimator.start(_as_identified(start, estimate))
     initial = tracker.calibrated
     still = standing.window(float(standing.time[window.start]), float(standing.time[window.stop - 1]))
-    markers = initial.ground.points_to_ground(
-        np.stack([still.marker(name) for name in initial.recorded_markers], axis=1)
-    )
-    wrench = recording_arrays(still, initial, gaps=True)[1] if still.plates else np.full((still.n_frames, 6), np.nan)
+    markers = marker_paths(still, initial, gaps=True)
+    wrench = total_wrench(still, initial, gaps=True, lacking=not still.plates)
     run = tracker.run_smoothed_arrays if can_smooth(estimator.noise) else tracker.run_arrays
     state = run(still.time, markers, wrench)["state"]
     free = free_names(initial.spec)

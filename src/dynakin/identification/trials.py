@@ -12,6 +12,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.samples import marker_paths
 from dynakin.filter.sight import hidden_segments, root_of
 from dynakin.filter.sources import ContactSources
 from dynakin.filter.tracker import Tracker
@@ -28,7 +29,7 @@ from dynakin.results.measures.tracking import why_lost
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.freeze import freeze, initial_values
-from dynakin.validation.held_out import as_estimate, marker_paths, measured_wrench, start_as
+from dynakin.validation.held_out import as_estimate, measured_wrench, start_as
 
 Array = npt.NDArray[np.float64]
 
@@ -172,7 +173,7 @@ class Common:
         """
         recording = replace(recording, plates=())
         start = start_as(self.initial, self.estimator, recording, self.static)
-        markers = marker_paths(recording, self.initial, start.ground)
+        markers = marker_paths(recording, self.initial, start.ground, lacking=True)
         coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
         frozen = freeze(self.initial, initial_values(self.initial), coordinates)
         tracker = self.estimator.start(frozen)

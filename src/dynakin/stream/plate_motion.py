@@ -99,7 +99,7 @@ class LivePlateMotion:
         ratio = float(total[judged, 1].mean() / needed.force[judged, 1].mean())
         foreign = float(np.mean(~whole[known]))
         if not foreign:
-            self.mass = doubtful_mass(total, self._initial.weighed_kg, ratio, self._initial.unseen_kg)
+            self.mass = doubtful_mass(self._initial, ratio * self._initial.weighed_kg)
         elif foreign > NEARLY_ALL:
             self.mass = warning(
                 "weight",

@@ -207,8 +207,7 @@ def check_loaded(estimator: Estimator, initial: CalibratedModel, recording: Reco
         text = f"the plates carry {mass:.1f} kg where the person weighs {initial.weighed_kg:.1f} kg"
         return [*said, warning("weight", f"{text}; the plates are not used.")], False
     if mass is not None and initial.feet:
-        ratio = mass / initial.weighed_kg
-        doubt = doubtful_mass(np.zeros((0, 6)), initial.weighed_kg, ratio, initial.unseen_kg)
+        doubt = doubtful_mass(initial, mass)
         said += [doubt] if doubt else []
     return said, True
 

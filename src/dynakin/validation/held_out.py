@@ -13,7 +13,7 @@ from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.ground.known import known_ground
-from dynakin.filter.ground.plate_sum import doubtful_mass
+from dynakin.filter.samples import marker_paths
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -146,7 +146,7 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     setup, measured = identified.setup, identified.initial
     standing = identified.static or identified.recording
     start = start_as(measured, setup.common, recording, standing, identified.ground)
-    markers = marker_paths(recording, measured, start.ground)
+    markers = marker_paths(recording, measured, start.ground, lacking=True)
     blank = np.full((recording.n_frames, 6), np.nan)
     coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
     found: dict[str, Array] = {}
@@ -212,10 +212,9 @@ def measured_wrench(
             f"{recording.path or recording.name}: no force plates, expected at least one: what is predicted is "
             "judged by them (--forces)"
         )
-    markers = marker_paths(recording, initial, initial.ground)
+    markers = marker_paths(recording, initial, lacking=True)
     ground, wrench = known_ground(recording, initial, markers, plates, tolerance)
-    doubt = doubtful_mass(wrench, initial.weighed_kg, ground.load_ratio, initial.unseen_kg)
-    warnings = warnings_of([*ground.notes, *([doubt] if doubt else [])])
+    warnings = warnings_of([*ground.notes, *([ground.doubt] if ground.doubt else [])])
     if not np.isfinite(wrench).all(axis=1).any():
         where = recording.path or recording.name
         why = "".join(f"; {message.text.rstrip('.')}" for message in warnings)
@@ -223,13 +222,6 @@ def measured_wrench(
             f"{where}: in no frame do the plates measure the whole wrench, expected a second of them{why}"
         )
     return wrench, warnings
-
-
-def marker_paths(recording: Recording, initial: CalibratedModel, ground: GroundFrame) -> Array:
-    """Paths (T, M, 3) m of the model's markers in the ground frame; one that the recording lacks is NaN."""
-    missing = np.full((recording.n_frames, 3), np.nan)
-    paths = [recording.marker(name) if name in recording.marker_names else missing for name in initial.recorded_markers]
-    return ground.points_to_ground(np.stack(paths, axis=1))
 
 
 def as_estimate(
@@ -277,7 +269,7 @@ def start_as(
 
 
 def _inverse(setup: Setup, start: CalibratedModel, recording: Recording) -> dict[str, Array]:
-    markers = marker_paths(recording, start, start.ground)
+    markers = marker_paths(recording, start, lacking=True)
     cutoffs = usual_cutoffs(setup.cutoff_hz, recording.time)
     motions = rigid_motions(start, recording.time, markers, cutoffs)
     return {f"{inverse_name(cutoff)}, table": motion.wrench() for cutoff, motion in motions.items()}

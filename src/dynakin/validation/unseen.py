@@ -114,7 +114,7 @@ def unseen_figures(
     for preset in setup.noise:
         estimator = setup.estimator(preset)
         initial = estimator.start(recording, static=static).calibrated
-        markers, wrench = estimator.measured(recording, initial)
+        markers, wrench, _ = estimator.measured(recording, initial)
         trial = _Trial(recording, initial, markers, wrench)
         figures |= _left_out(estimator, preset, trial, progress)
         figures |= _ahead(estimator, preset, trial, horizon_s)

@@ -175,9 +175,9 @@ def test_the_filter_runs_on_it(folder: Path, squats: Recording) -> None:
     """Half a second: finite, and nearer to the markers than the file's places are."""
     estimator = dynakin.Estimator(load_model(folder / FILE, Subject(mass_kg=60.05)))
     tracker = estimator.start(squats)
-    from dynakin.filter.samples import recording_arrays
+    from dynakin.filter.samples import marker_paths, total_wrench
 
-    markers, wrench = (values[:50] for values in recording_arrays(squats, tracker.calibrated, gaps=True))
+    markers, wrench = (read(squats, tracker.calibrated, gaps=True)[:50] for read in (marker_paths, total_wrench))
     arrays = tracker.run_arrays(squats.time[:50], markers, wrench)
     gap = arrays["markers_estimated"] - markers
     assert np.isfinite(arrays["state"]).all()

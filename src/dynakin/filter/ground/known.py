@@ -12,8 +12,9 @@ import numpy.typing as npt
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in_words, out_of_step_in_words
 from dynakin.filter.ground.fine_delay import UNKNOWN_S, clock_delay
-from dynakin.filter.ground.judged import Ground, GroundTrial, OnGround
-from dynakin.filter.ground.plate_sum import MASS_APART
+from dynakin.filter.ground.judged import Ground, judged
+from dynakin.filter.ground.on_ground import GroundTrial, OnGround
+from dynakin.filter.ground.plate_sum import MASS_APART, doubtful_mass, mean_load_kg
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.blank import without_blanks
@@ -61,14 +62,16 @@ def known_ground(
     as_it_is = OnGround.of(trial)
     coarse = as_it_is.coarse_delay()
     on_ground = as_it_is if coarse is None else OnGround.of(trial.in_step(coarse))
-    ground, known = on_ground.judged()
+    ground, known = judged(on_ground)
     clock = _Clock(coarse, 0.0 if coarse is None else coarse.sd_s, ())
     if ground.loads is not None and ground.loads.on.any():
         clock, ground, known = _in_step(as_it_is, coarse, on_ground, ground, known)
     moved = () if clock.taken is None else (_taken_in_words(clock.taken, recording, not initial.unseen_kg),)
     behind_s = 0.0 if clock.taken is None else clock.taken.delay_s
     notes = (*zeros, *moved, *ground.notes, *clock.notes)
-    return replace(ground, notes=notes, behind_s=behind_s, clock_sd_s=clock.sd_s), known
+    load_kg = mean_load_kg(known, least=50) if ground.load_ratio is None else ground.load_ratio * initial.weighed_kg
+    doubt = None if load_kg is None else doubtful_mass(initial, load_kg)
+    return replace(ground, notes=notes, behind_s=behind_s, clock_sd_s=clock.sd_s, doubt=doubt), known
 
 
 class _Clock(NamedTuple):
@@ -98,14 +101,14 @@ def _in_step(
             break
         fine = left.after(fine or coarse or IN_STEP)
         on_ground = OnGround.of(trial.in_step(fine))
-        ground, known = on_ground.judged()
+        ground, known = judged(on_ground)
         if whole and not left.apart:
             break
     if fine is not None and fine.worth_it(whole):
         return _Clock(fine, fine.sd_s, ()), ground, known
     if fine is not None:  # the coarse search had them out of step
         left, coarse = fine, None
-        ground, known = as_it_is.judged()
+        ground, known = judged(as_it_is)
     if left is None:
         said = () if coarse else (note("sum of the plates", CLOCK_UNKNOWN),)
         return _Clock(coarse, coarse.sd_s if coarse else UNKNOWN_S, said), ground, known

@@ -11,10 +11,10 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.filter.ground.closure import Closure, closure
 from dynakin.filter.ground.declared import bearing
+from dynakin.filter.ground.on_ground import OnGround
 from dynakin.filter.ground.shear import not_zeroed
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.checks import PlateCheck
 from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
@@ -56,23 +56,15 @@ class Carried(NamedTuple):
     found: Closure | None = None
 
 
-def judged_by_motion(
-    recording: Recording,
-    initial: CalibratedModel,
-    markers: Array,
-    wrenches: list[Array],
-    loads: FootLoads | None,
-    check: PlateCheck,
-    may: Flags,
-    by_plate: list[bool],
-    tolerance: float | None,
-) -> Carried:
+def judged_by_motion(on: OnGround, wrenches: list[Array], tolerance: float | None) -> Carried:
     """Whether the plates carry what the motion needs, where feet and plates say that they carry the person.
 
     Args:
         wrenches: (T, 6) of all plates, and, where one is found to have another gain, the same without that.
+        tolerance: as of `GroundTrial`; None: nobody asks.
     """
-    wrench = wrenches[0]
+    recording, initial, markers = on.trial.recording, on.trial.initial, on.trial.markers
+    loads, may, by_plate, wrench = on.loads, on.may, on.by_plate, wrenches[0]
     n, names, notes, reasons = recording.n_frames, list(initial.contacts), list[Message](), list[Message]()
     measured: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
     claimed = measured if loads is None else loads.total_known
@@ -91,7 +83,7 @@ def judged_by_motion(
     found, *without = [closure(initial, recording.time, markers, each, claimed, unmeasured, pulls) for each in wrenches]
     if found is None:
         flies = loads is not None and bool(loads.aloft.all(axis=1).any())  # which weighs nobody
-        foreign = None if flies or names else _foreign_load(check, wrench, claimed, initial, tolerance)
+        foreign = None if flies or names else _foreign_load(on, wrench, claimed, tolerance)
         reasons += [foreign] if foreign else []
         return Carried(
             may, undeclared | (foreign is not None), beyond, None, [*notes, note("plates", UNJUDGED)], reasons
@@ -233,35 +225,32 @@ def _stands_alone(loads: FootLoads, k: int, frames: slice) -> bool:
     return bool((standing[:, k] & (standing.sum(axis=1) == 1)).mean() > 0.5)
 
 
-def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unseen_kg: float = 0.0) -> Message | None:
-    """Sentences where the plates contradict the mass: by `Ground.load_ratio`, or, where that is not known, by the mean
-    vertical force of the known frames of the wrench (T, 6)."""
-    load = _mean_load_kg(wrench, least=50) if load_ratio is None else load_ratio * mass_kg
-    within = MASS_APART + UNSEEN_APART * unseen_kg / mass_kg
-    if load is None or abs(load - mass_kg) <= within * mass_kg:
+def doubtful_mass(initial: CalibratedModel, load_kg: float) -> Message | None:
+    """Sentences where what the plates carry contradicts the mass."""
+    mass_kg = initial.weighed_kg
+    within = MASS_APART + UNSEEN_APART * initial.unseen_kg / mass_kg
+    if abs(load_kg - mass_kg) <= within * mass_kg:
         return None
-    carried = ", or a load is carried (moments of back and arms are wrong by it)" if load > mass_kg else ""
+    carried = ", or a load is carried (moments of back and arms are wrong by it)" if load_kg > mass_kg else ""
     return warning(
         "weight",
-        f"the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
-        f"({100.0 * abs(load - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
+        f"the plates carry {load_kg:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
+        f"({100.0 * abs(load_kg - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
         f"mass{carried}. Forces, moments and inertia take the error on.",
     )
 
 
-def _foreign_load(
-    check: PlateCheck, wrench: Array, claimed: Flags, initial: CalibratedModel, tolerance: float | None
-) -> Message | None:
+def _foreign_load(on: OnGround, wrench: Array, claimed: Flags, tolerance: float | None) -> Message | None:
     """A sentence where the plates' mean load is not the person's weight, for recordings that `closure` cannot judge.
 
     Args:
         tolerance: part of the weight by which they may differ; None: nobody asks.
     """
-    mass_kg = initial.weighed_kg
-    if initial.feet:
-        load, mean = _mean_load_kg(wrench[claimed], least=1), " on average"
-    else:
-        load, mean = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg, ""
+    mass_kg, check, load, mean = on.trial.initial.weighed_kg, on.check, None, ""
+    if on.trial.initial.feet:
+        load, mean = mean_load_kg(wrench[claimed], least=1), " on average"
+    elif check is not None:
+        load = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg
     if tolerance is None or load is None or abs(load - mass_kg) <= tolerance * mass_kg:
         return None
     return warning(
@@ -272,7 +261,7 @@ def _foreign_load(
     )
 
 
-def _mean_load_kg(wrench: Array, least: int) -> float | None:
+def mean_load_kg(wrench: Array, least: int) -> float | None:
     """Mean vertical force of the known frames of a wrench (T, 6) as a mass; None of fewer than ``least``."""
     push = wrench[np.isfinite(wrench).all(axis=1), 1]
     return float(push.mean()) / GRAVITY_M_S2 if len(push) >= least else None

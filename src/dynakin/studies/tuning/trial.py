@@ -95,7 +95,7 @@ def prepare(recording: Recording, estimator: Estimator, *, static: Recording | N
     recording = recording.without_empty_ends()
     initial = estimator.calibrate(recording, static=static)
     tracker = estimator.start(initial)
-    markers, wrench = estimator.measured(recording, tracker.calibrated)
+    markers, wrench, _ = estimator.measured(recording, tracker.calibrated)
     if _doubts(estimator.noise):
         _, arrays, shift, _ = run_in_step(tracker, recording.time, markers, wrench)
         wrench = in_step(recording.time, wrench, shift) if shift else wrench

@@ -1,0 +1,192 @@
+"""Who stands where, by feet and plates that are in step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import RecordingError
+from dynakin.filter.ground.axes import turned_axes
+from dynakin.filter.ground.coarse_delay import plates_delay
+from dynakin.filter.ground.declared import declared_contacts, plates_of_their_own
+from dynakin.filter.ground.delay import Delay, brought_into_step
+from dynakin.filter.ground.needed import Needed
+from dynakin.filter.ground.shear import NO_SHEAR, Shear
+from dynakin.filter.samples import total_wrench
+from dynakin.messages import note
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.checks import PlateCheck, check_plates
+from dynakin.recordings.feet.assignment import check_assigned, foot_loads
+from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.plates.stuck import vertical_only
+from dynakin.recordings.recording import Recording
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class GroundTrial:
+    """What is judged: markers (T, M, 3) m, of the model, ground frame; assigned, tolerance: as for `known_ground`."""
+
+    recording: Recording
+    initial: CalibratedModel
+    markers: Array
+    assigned: Mapping[str, str] | None
+    tolerance: float | None
+
+    @cached_property
+    def wrench(self) -> Array:
+        """(T, 6) N and N m of all plates, ground frame; NaN where one of them is not measured."""
+        return total_wrench(self.recording, self.initial, lacking=True)
+
+    @cached_property
+    def wrenches(self) -> Array:
+        """(P, T, 6) of each plate."""
+        return np.stack([self.initial.ground.wrench_to_ground(plate.wrench) for plate in self.recording.plates])
+
+    def in_step(self, delay: Delay) -> GroundTrial:
+        """The same of what the plates say so much later."""
+        return replace(self, recording=brought_into_step(self.recording, delay))
+
+    def without_plates(self) -> GroundTrial:
+        """The same of the markers alone."""
+        return replace(self, recording=self.recording.with_plates(()), assigned=None)
+
+
+@dataclass(frozen=True, eq=False)
+class OnGround:
+    """Who stands where, by feet and plates.
+
+    Attributes:
+        loads: of each foot; None of a model that stands on its root.
+        paths: (T, 1 + C, 3) m where the root and the declared contacts are.
+        may: (T, C) frames in which each of these may bear. by_plate: (C,) those that a plate measures; taken:
+            plates that are theirs though nobody said so.
+        check: of the plates; None without any. shear: what is known of their horizontal forces before they are judged.
+        needed: what the motion needs; None of a model that stands on its root.
+    """
+
+    trial: GroundTrial
+    loads: FootLoads | None
+    paths: Array
+    may: Flags
+    by_plate: list[bool]
+    taken: Mapping[str, tuple[str, ...]]
+    check: PlateCheck | None
+    shear: Shear
+    needed: Needed | None
+
+    @staticmethod
+    def of(trial: GroundTrial) -> OnGround:
+        """Of a trial.
+
+        Raises:
+            RecordingError: the plates are refused.
+        """
+        recording, initial = trial.recording, trial.initial
+        loads = _loads_of_feet(trial)
+        paths, may = declared_contacts(initial, trial.markers)
+        taken = dict[str, tuple[str, ...]]()
+        if loads is not None and initial.contacts and recording.plates:
+            taken = plates_of_their_own(recording, initial, loads, paths, may, trial.assigned or {})
+            loads = _loads_of_feet(trial, taken) if taken else loads
+        by_plate = [loads is not None and name in loads.others for name in initial.contacts]
+        may &= ~np.array(by_plate, dtype=bool)
+        found = OnGround(trial, loads, paths, may, by_plate, taken, None, NO_SHEAR, None)
+        if not recording.plates:
+            return found
+        # steps off the plates: their mean load is no mass
+        mass = None if initial.feet else initial.weighed_kg
+        steps_kg = initial.weighed_kg if initial.feet and not initial.contacts else None
+        check = check_plates(recording, initial.ground, mass, initial.foot_markers, loads, steps_kg)
+        if check.refusal:
+            raise RecordingError(
+                f"{recording.plates_file}: {check.refusal}{_how_to_give(initial, loads, check.under_no_foot)}"
+            )
+        if check.unused:
+            return replace(found, check=check)
+        shear = Shear(unmeasured=True) if vertical_only(recording) else NO_SHEAR
+        if shear.unmeasured and loads is None:
+            raise RecordingError(
+                f"{recording.plates_file}: the plates measure the vertical force only (horizontal forces are 0, or "
+                "follow it), and this model takes all of the force: export the horizontal forces as well"
+            )
+        needed = None if loads is None else Needed(initial, recording.time, trial.markers)
+        if needed is not None and loads is not None and not shear.unmeasured:
+            wrong = turned_axes(needed, recording.plates, initial, loads.total_known)
+            if wrong:
+                raise RecordingError(f"{recording.plates_file}: {wrong}")
+        return replace(found, check=check, shear=shear, needed=needed)
+
+    def coarse_delay(self) -> Delay | None:
+        """By how much the plates lag, to some milliseconds; None where they are in step, or nothing can be said."""
+        if self.needed is None or self.loads is None:
+            return None
+        needed = self.needed.vertically() if self.shear.unmeasured else self.needed
+        return plates_delay(needed, self.total(self.loads, self.needed))
+
+    @property
+    def unmeasured(self) -> list[int]:
+        """Declared contacts that no plate measures."""
+        return [c for c, measured in enumerate(self.by_plate) if not measured]
+
+    @property
+    def places(self) -> Array:
+        """(T, C, 3) m of those."""
+        return self.paths[:, [1 + c for c in self.unmeasured]]
+
+    def all_of_it(self, needed: Needed) -> Array:
+        """The total wrench (T, 6), with the motion's horizontal force where plates have none."""
+        wrench = self.trial.wrench
+        return needed.with_horizontal(wrench) if self.shear.unmeasured else wrench
+
+    def total(self, loads: FootLoads, needed: Needed) -> Array:
+        """(T, 3) N of all plates, where that is all that bears the person; NaN elsewhere."""
+        return np.where(loads.total_known[:, None], self.all_of_it(needed)[:, :3], np.nan)
+
+
+def _loads_of_feet(trial: GroundTrial, taken: Mapping[str, tuple[str, ...]] | None = None) -> FootLoads | None:
+    """What each foot carries by feet and plates, of which some are taken as declared contacts'; None of a model that
+    stands on its root."""
+    recording, initial, assigned = trial.recording, trial.initial, trial.assigned
+    if not initial.feet:  # it takes all plates together, and is told wrong names all the same
+        check_assigned(assigned or {}, recording, ("right", "left"))
+        return None
+    loads = foot_loads(
+        recording,
+        initial.ground,
+        initial.foot_markers,
+        assigned=assigned,
+        others=list(initial.contacts),
+        given=taken,
+    )
+    if not initial.unmarked_feet:
+        return loads
+    hidden = np.isin(loads.feet, list(initial.unmarked_feet))
+    loads = loads.without(np.tile(hidden, (recording.n_frames, 1)))
+    text = (
+        f"No markers of the {' and the '.join(initial.unmarked_feet)} foot that show where it stands: what it carries "
+        "is not known. Moments are those of a leg whose own foot is on a plate, or in the air."
+    )
+    return replace(loads, reasons=(*loads.reasons, note("plates", text)))
+
+
+def _how_to_give(initial: CalibratedModel, loads: FootLoads | None, plate: str | None) -> str:
+    """What to do about a plate that is refused for where it is pressed: something else than a foot may bear on it."""
+    names = [name for name in initial.contacts if loads is not None and name not in loads.others]
+    if plate is None or not initial.feet:
+        return ""
+    if not initial.contacts:
+        return (
+            f". If a chair, a hand or a knee is on {plate}, declare it (--contact seat, hand_right or knee=shank_l), "
+            "else the plate's place or its unit is wrong, or the forces are of another trial, or in other axes than "
+            "the markers (turned about the vertical, say)"
+        )
+    if not names:
+        return ""
+    return f'. If {plate} bears the {names[0]}, say so in a configuration: plates = {{ "{plate}" = "{names[0]}" }}'
