@@ -95,11 +95,11 @@ class CalibratedModel(StartingState):
         feet: "right", "left" -> segment on which the ground acts; empty for a model fixed in the ground.
         contacts: name -> segment, of the contacts that are declared in addition to the feet (a seat, hands on a rail).
         foot_markers: "right", "left" -> the recording's names of the markers on that foot.
-        unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
-            added to the noise of the cameras.
+        unmodelled_m: (M,) or one for all, m: standard deviation of what neither a state nor the cameras explain of each
+            marker; it is added to the noise of the cameras.
         skin_lasts: how many times longer skin stays displaced than the noise settings say of a floating model.
         dimensionless: geometry parameters that are factors, not lengths.
-        carried_kg: mass of the known loads (`model.calibration.loads`), not in ``mass_kg``.
+        carried_kg: mass of the known loads (`declared.with_loads`), not in ``mass_kg``.
         height_stated: whether the height is somebody's word, and not estimated from markers.
         own_inertia: whether inertia was identified of this person, and is not the table's.
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.

@@ -67,5 +67,5 @@ def support_height(estimate: Estimate, wrench: Array) -> float | Array:
 
 
 def floor_height(estimate: Estimate) -> float:
-    """Height (m, ground frame) of the floor; see `recordings.plates.surfaces`."""
+    """Height (m, ground frame) of the floor; see `ground_plate.floor_height`."""
     return recorded_floor(estimate.recording, estimate.ground)
