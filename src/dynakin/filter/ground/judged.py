@@ -33,7 +33,7 @@ from dynakin.filter.ground.declared import (
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
 from dynakin.filter.ground.needed import Needed
-from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion, pressed_at
+from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
 from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
@@ -45,7 +45,7 @@ from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
 from dynakin.recordings.plates.stuck import vertical_only
 from dynakin.recordings.recording import Recording
 from dynakin.settings.contacts import SEAT

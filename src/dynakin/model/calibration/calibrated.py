@@ -18,8 +18,7 @@ from dynakin.model.plan import ModelPlan
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import JointPrior
 from dynakin.recordings.frame import GroundFrame
-from dynakin.recordings.plates.ground_plate import level_pressure
-from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
 from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
@@ -266,5 +265,5 @@ def first_centre_of_pressure(recording: Recording, ground: GroundFrame) -> Array
     loaded = wrench[on][recording.time[on] < recording.time[on[:1]] + 1.0]
     if not len(loaded):
         return np.zeros(3)
-    x, z = level_pressure(loaded.mean(axis=0)[None], 0.0)[0]
+    x, z = pressed_at(loaded.mean(axis=0))
     return np.array([x, 0.0, z])
