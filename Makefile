@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE  # tests start many processes; each would compi
 # pip compiles there, and the C++ tests link the same core.
 export SKBUILD_BUILD_DIR := build/package
 # A file's tests stay in one process, so that what they share is made once.
-PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile
+PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --durations 20 --durations-min 5
 
 .PHONY: all demo live check test test-python test-cpp test-cpp-install test-cpp-sanitize test-cpp-address test-cpp-thread lint stubs bench peers nightly clean prerequisites
 all: $(VENV)/.built

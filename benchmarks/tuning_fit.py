@@ -57,7 +57,7 @@ def main() -> None:
     base = presets.default()
     trial = prepare(recording, Estimator(definition, base), static=static)
     middle = recording.n_frames // 2
-    first, second = trial.counted(trial.first, middle), trial.counted(middle, recording.n_frames)
+    first, second = replace(trial, end=middle), replace(trial, first=middle, end=recording.n_frames)
     with open_pool("threads", asked.jobs) as pool:
         noises = {
             "paper": presets.paper(),

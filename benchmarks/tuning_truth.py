@@ -18,6 +18,7 @@ import numpy as np
 
 import dynakin
 from dynakin.files import write_csv
+from dynakin.filter.core_filter import core_filter
 from dynakin.filter.estimator import Estimator
 from dynakin.model.spec import free_names
 from dynakin.report.paper_figures.figures import save_sensitivity_figures
@@ -29,7 +30,7 @@ from dynakin.studies.engine.journal import ROWS, Journal, open_folder
 from dynakin.studies.engine.pools import open_pool, work
 from dynakin.studies.engine.tasks import Task
 from dynakin.studies.tuning.grid import axis, combinations, mean_row
-from dynakin.studies.tuning.score import CRITERIA, figures_from, run_score
+from dynakin.studies.tuning.score import CRITERIA, LOST_M, figures_from
 from dynakin.studies.tuning.trial import TuningTrial, prepare, undoubting
 from dynakin.validation.truth import LEG
 
@@ -64,9 +65,13 @@ def score(trials: list[WithTruth], payload: tuple[int, dict[str, Any], str]) -> 
     number, changes, base = payload
     told = trials[number]
     noise = undoubting(presets.preset(base, changes))
-    sums = run_score(told.trial, noise, trace=True)
-    found = figures_from(sums, told.trial, presets.paper())
-    window = slice(told.trial.first, told.trial.end)
+    trial = told.trial
+    _, _, core = core_filter(trial.initial, noise, trial.estimate)
+    sums = core.score(
+        trial.time, trial.markers, trial.wrench, trial.first, trial.end, ahead=trial.ahead, lost_m=LOST_M, trace=True
+    )
+    found = figures_from(sums, trial, presets.paper())
+    window = slice(trial.first, trial.end)
     angle = np.degrees(sums["state"][window, : len(told.names)] - told.coordinates[window])
     all_names = [c.name for c in told.trial.initial.spec.coordinates]
     leg = [told.names.index(name) for name in LEG]

@@ -3,32 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import dynakin
-from dynakin import Estimator, Subject, load_model
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.fine_delay import MODEL_S, PRIOR_S, clock_delay
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.messages import about
 from dynakin.recordings.recording import Recording
-from dynakin.simulation.trial import simulate as simulate_anew
-
-simulate = cache(simulate_anew)
-
-
-def person() -> Estimator:
-    return Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male")))
-
-
-@cache
-def prepared() -> Prepared:
-    return person().prepare(simulate("fullbody", "gait", 7, 4.0).recording)
+from support.plates import person, prepared, trial
 
 
 def delay_of(recording: Recording, ready: Prepared) -> Delay | None:
@@ -40,21 +27,21 @@ def delay_of(recording: Recording, ready: Prepared) -> Delay | None:
 @pytest.mark.parametrize("moved_s", [-0.01, -0.004, 0.0, 0.006, 0.012])
 def test_a_few_milliseconds_are_found_in_a_walk(moved_s: float) -> None:
     """Within its deviation, and drawn towards none by as much as that asks for."""
-    ready = prepared()
-    found = delay_of(brought_into_step(simulate("fullbody", "gait", 7, 4.0).recording, Delay(-moved_s, 0.0)), ready)
+    ready = prepared("gait")
+    found = delay_of(brought_into_step(trial("gait"), Delay(-moved_s, 0.0)), ready)
     assert found is not None and MODEL_S < found.sd_s < 0.0035
     assert found.delay_s == pytest.approx(moved_s * (1.0 - (found.sd_s / PRIOR_S) ** 2), abs=0.0015)
 
 
 def test_who_stands_shows_no_delay() -> None:
-    recording = simulate("fullbody", "squat", 7, 8.0).recording.window(0.0, 1.2)
+    recording = trial("squat").window(0.0, 1.2)
     ready = person().prepare(recording)
     found = delay_of(brought_into_step(recording, Delay(-0.01, 0.0)), ready)
     assert found is not None and abs(found.delay_s) < 0.002 and found.sd_s > 0.8 * PRIOR_S
 
 
 def test_nothing_is_said_where_forces_are_missing_or_frames_are_few() -> None:
-    ready, recording = prepared(), simulate("fullbody", "gait", 7, 4.0).recording
+    ready, recording = prepared("gait"), trial("gait")
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     held = replace(ready.calibrated, contacts={"seat": "pelvis"})
     assert clock_delay(held, recording.time, markers, wrench) is None
@@ -64,7 +51,7 @@ def test_nothing_is_said_where_forces_are_missing_or_frames_are_few() -> None:
 
 
 def test_frames_that_show_too_little_are_left_out_and_the_rest_is_asked() -> None:
-    ready, recording = prepared(), simulate("fullbody", "gait", 7, 4.0).recording
+    ready, recording = prepared("gait"), trial("gait")
     late = brought_into_step(recording, Delay(-0.01, 0.0))
     gaps = late.markers.copy()
     known = np.flatnonzero(np.isfinite(ready.wrench).all(axis=1))
@@ -76,7 +63,7 @@ def test_frames_that_show_too_little_are_left_out_and_the_rest_is_asked() -> Non
 
 def test_a_run_brings_plates_into_step_and_says_so_where_it_is_not_by_chance() -> None:
     """A frame late: moments are those of plates in step."""
-    whole = simulate("fullbody", "gait", 7, 4.0).recording
+    whole = trial("gait")
     late = brought_into_step(whole, Delay(-0.01, 0.0))
     right, found = (person().run(recording) for recording in (whole, late))
     assert found.config["ground"]["plates_behind_s"] == pytest.approx(0.01, abs=0.002)
@@ -105,8 +92,8 @@ def drifting(recording: Recording, drift: float) -> Recording:
 @pytest.mark.parametrize("drift", [0.03, -0.03])
 def test_a_clock_that_is_faster_or_slower_is_found_and_plates_are_brought_into_step(drift: float) -> None:
     """Known to half a percent by the 1.2 s in which its three plates carry the person."""
-    whole = simulate("fullbody", "gait", 7, 4.0).recording
-    before, ready = person().prepare(whole), person().prepare(drifting(whole, drift))
+    whole = trial("gait")
+    before, ready = prepared("gait"), person().prepare(drifting(whole, drift))
     assert not about(before.messages, "rate")
     (said,) = about(ready.messages, "rate")
     assert said.level == "warning" and ("faster" if drift > 0.0 else "slower") in said.text
@@ -128,8 +115,8 @@ def with_a_clock_of_its_own(recording: Recording, which: int, late_s: float) -> 
 
 def test_one_plate_with_a_clock_of_its_own_is_named_and_brought_into_step() -> None:
     """20 ms late: the mean delay put the others out of step, or looked like a drift."""
-    whole = simulate("fullbody", "gait", 7, 4.0).recording
-    before, late = person().prepare(whole), with_a_clock_of_its_own(whole, 1, 0.02)
+    whole = trial("gait")
+    before, late = prepared("gait"), with_a_clock_of_its_own(whole, 1, 0.02)
     ready = person().prepare(late)
     (said,) = about(ready.messages, "in step")
     assert said.level == "warning" and "plate 2 is" in said.text and said.text.count("the others") == 1
@@ -158,7 +145,7 @@ def test_a_real_squat_shows_a_clock_that_drifts_and_none_that_does_not(data_dir:
 
 
 def test_no_drift_is_asked_for_where_a_load_that_moves_looks_like_one() -> None:
-    ready, recording = prepared(), drifting(simulate("fullbody", "gait", 7, 4.0).recording, 0.03)
+    ready, recording = prepared("gait"), drifting(trial("gait"), 0.03)
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     known = np.where(np.isfinite(ready.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     asked, not_asked = (
@@ -169,7 +156,7 @@ def test_no_drift_is_asked_for_where_a_load_that_moves_looks_like_one() -> None:
 
 def test_who_lands_shows_no_few_milliseconds() -> None:
     """Flesh follows later than bones."""
-    ready, recording = prepared(), simulate("fullbody", "gait", 7, 4.0).recording
+    ready, recording = prepared("gait"), trial("gait")
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     wrench = np.where(np.isfinite(ready.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     known = np.flatnonzero(np.isfinite(wrench[:, 1]))
@@ -179,7 +166,7 @@ def test_who_lands_shows_no_few_milliseconds() -> None:
 
 def test_short_gaps_hide_no_delay() -> None:
     """Three frames without markers, blank or not in the file at all."""
-    ready, recording = prepared(), brought_into_step(simulate("fullbody", "gait", 7, 4.0).recording, Delay(-0.01, 0.0))
+    ready, recording = prepared("gait"), brought_into_step(trial("gait"), Delay(-0.01, 0.0))
     whole = delay_of(recording, ready)
     assert whole is not None
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
@@ -22,34 +20,9 @@ from dynakin.filter.ground.needed import Needed
 from dynakin.filter.prepared import Prepared
 from dynakin.messages import about, warnings_of
 from dynakin.recordings.feet.loads import MEASURED, UNKNOWN
-from dynakin.recordings.recording import Array, Plate, Recording
-from dynakin.simulation.trial import simulate as simulate_anew
-
-simulate = cache(simulate_anew)
-
-
-def person(mass_kg: float = 70.0, *contacts: str) -> Estimator:
-    return Estimator(load_model("fullbody", Subject(mass_kg=mass_kg, height_m=1.75, sex="male")), contacts=contacts)
-
-
-def walk() -> Recording:
-    return simulate("fullbody", "gait", 7, 4.0).recording
-
-
-def with_plate(recording: Recording, which: int, change: Callable[[Plate], Plate]) -> Recording:
-    return recording.with_plates(tuple(change(p) if k == which else p for k, p in enumerate(recording.plates)))
-
-
-def scaled(part: float | Array) -> Callable[[Plate], Plate]:
-    """A plate with so much of all it says, where it presses as before."""
-    factor = np.reshape(part, (-1, 1))
-
-    def of(plate: Plate) -> Plate:
-        return replace(
-            plate, force=plate.force * factor, moment=plate.moment * factor, free_moment=plate.free_moment * factor
-        )
-
-    return of
+from dynakin.recordings.recording import Plate
+from dynakin.simulation.trial import simulate
+from support.plates import person, prepared, scaled, trial, with_plate
 
 
 def said_of_gains(ready: Prepared) -> list[str]:
@@ -59,8 +32,8 @@ def said_of_gains(ready: Prepared) -> list[str]:
 @pytest.mark.parametrize("part", [0.9, 1.1])
 @pytest.mark.parametrize("mass_kg", [70.0, 73.0])
 def test_a_plate_of_another_gain_is_named_whatever_the_person_weighs(part: float, mass_kg: float) -> None:
-    recording = with_plate(walk(), 1, scaled(part))
-    ready, right = person(mass_kg).prepare(recording), person(mass_kg).prepare(walk())
+    recording = with_plate(trial("gait"), 1, scaled(part))
+    ready, right = person(mass_kg=mass_kg).prepare(recording), prepared("gait", mass_kg=mass_kg)
     (text,) = said_of_gains(ready)
     assert "plate 2 shows" in text and not said_of_gains(right) and right.ground.off_gain is None
     assert float(text.split("plate 2 shows ")[1].split()[0]) == pytest.approx(part, abs=0.02)
@@ -75,24 +48,24 @@ def test_a_plate_of_another_gain_is_named_whatever_the_person_weighs(part: float
 def test_a_declared_hand_is_not_what_a_plate_is_off_by(part: float, told: bool) -> None:
     """It "bore up to 112 N" that were there at the plate alone: an ankle was 12 N m off, said to 4. Where moments do
     not tell which of the two it is, the foot's deviations hold it as well, and a note says so."""
-    ready = person(70.0, "hand_right").prepare(with_plate(walk(), 1, scaled(part)))
+    ready = person("hand_right").prepare(with_plate(trial("gait"), 1, scaled(part)))
     (said,) = about(ready.messages, "gain")
     assert "plate 2 shows" in said.text and (said in warnings_of(ready.messages)) == told
     assert ready.ground.off_gain is not None and ready.ground.off_gain.max() > 0.08
-    assert not said_of_gains(person(70.0, "hand_right").prepare(walk()))
+    assert not said_of_gains(prepared("gait", "hand_right"))
 
 
 @pytest.mark.parametrize("seed", [3, 4])
 def test_a_rail_that_is_declared_is_no_gain(seed: int) -> None:
     held = simulate("fullbody", "belt", seed, 6.0, 50.0, 70.0, 1.75, "male", rail=0.1).recording
-    ready = person(70.0, "hand_right").prepare(held)
+    ready = person("hand_right").prepare(held)
     assert not said_of_gains(ready) and ready.ground.bears.any()
 
 
 def test_deviations_of_moments_hold_what_a_plate_is_off_by() -> None:
     """Of the ankle and the knee over it."""
-    recording = with_plate(walk(), 1, scaled(1.06))
-    found, right = person().run(recording), person().run(walk())
+    recording = with_plate(trial("gait"), 1, scaled(1.06))
+    found, right = person().run(recording), person().run(trial("gait"))
     on = recording.plates[1].force[:, 1] > 300.0
     sides = ["ankle_angle_r", "ankle_angle_l", "knee_angle_r", "knee_angle_l"]
     wrong, true, sd, usual = (
@@ -119,7 +92,7 @@ def test_a_sensor_that_says_too_little_is_found_by_what_the_plate_lacks() -> Non
         moment -= np.cross(corner, np.stack([0.0 * lost, lost, 0.0 * lost], axis=1))
         return replace(plate, force=force, moment=moment)
 
-    (text,) = said_of_gains(person().prepare(with_plate(walk(), 1, lacking)))
+    (text,) = said_of_gains(person().prepare(with_plate(trial("gait"), 1, lacking)))
     assert "plate 2 shows 0.9" in text
 
 
@@ -140,7 +113,7 @@ def test_of_two_plates_nobody_knows_which_is_wrong(data_dir: Path) -> None:
 @pytest.mark.parametrize("start_s", [0.9, 1.4, 1.9])
 def test_a_hand_that_holds_on_for_a_while_is_no_gain(start_s: float) -> None:
     """A tenth of the weight, which does not follow a plate's load."""
-    recording = walk()
+    recording = trial("gait")
     held = 0.1 * np.clip(np.minimum(recording.time - start_s, start_s + 0.4 - recording.time) / 0.05, 0.0, 1.0)
     plates = tuple(scaled(1.0 - held)(plate) for plate in recording.plates)
     assert not said_of_gains(person().prepare(recording.with_plates(plates)))
@@ -200,7 +173,7 @@ def test_what_a_gain_is_off_by_is_all_of_the_load_or_one_sensors() -> None:
 @pytest.mark.parametrize("too_much_n", [150.0, 220.0])
 def test_a_foot_alone_on_a_plate_that_says_too_much_is_not_measured_meanwhile(too_much_n: float) -> None:
     """For 0.3 s, where the foot presses: no gain, and nothing that bears elsewhere."""
-    recording = walk()
+    recording = trial("gait")
     on = np.flatnonzero(recording.plates[1].force[:, 1] > 300.0)
     middle = recording.time[on].mean()
     more = too_much_n * (np.abs(recording.time - middle) < 0.15)
@@ -209,7 +182,7 @@ def test_a_foot_alone_on_a_plate_that_says_too_much_is_not_measured_meanwhile(to
         force = plate.force + np.stack([0.0 * more, more, 0.0 * more], axis=1)
         return replace(plate, force=force, moment=np.cross(np.nan_to_num(plate.cop), force) + plate.free_moment)
 
-    ready, right = person().prepare(with_plate(recording, 1, pushed)), person().prepare(recording)
+    ready, right = person().prepare(with_plate(recording, 1, pushed)), prepared("gait")
     loads, before = ready.ground.loads, right.ground.loads
     assert loads is not None and before is not None and not said_of_gains(ready)
     stands = loads.on[:, :, 1] & (more > 0.0)[:, None]

@@ -15,19 +15,15 @@ from dynakin.errors import DynakinError, RecordingError
 from dynakin.filter.ground.lean import root_path, turned_by_lean
 from dynakin.filter.prepared import Prepared
 from dynakin.recordings.recording import Recording
-from dynakin.simulation.trial import simulate
+from support.plates import person, prepared, trial
 
 UPPER = ("Sternum", "C7", "Shoulder", "humerus", "elbow", "forearm", "wrist")
-
-
-def person() -> Estimator:
-    return Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male")))
 
 
 @pytest.fixture(scope="module")
 def legs() -> tuple[Recording, Prepared]:
     """A walk of legs and pelvis, and as it is prepared."""
-    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    walk = trial("gait")
     kept = [k for k, name in enumerate(walk.marker_names) if not any(word in name for word in UPPER)]
     walk = replace(walk, markers=walk.markers[:, kept], marker_names=tuple(walk.marker_names[k] for k in kept))
     return walk, person().prepare(walk)
@@ -85,8 +81,8 @@ def test_one_side_of_a_pelvis_shows_no_lean(legs: tuple[Recording, Prepared]) ->
 
 def test_a_squat_shows_nothing_of_it() -> None:
     """Its pelvis goes back and forth behind the feet, and the trunk the other way."""
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
-    ready = person().prepare(squat)
+    squat = trial("squat")
+    ready = prepared("squat")
     root = root_path(ready.calibrated, ready.markers)
     for turn in (np.eye(2), -np.eye(2)):
         assert turned_by_lean(turned(squat, turn).plates, ready.calibrated, root, squat.rate) is None

@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,30 +27,10 @@ from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.resampling import low_pass
 from dynakin.results.measures.sources import ABSENT
 from dynakin.settings.settings import Settings
-from dynakin.simulation.trial import simulate as simulate_anew
+from dynakin.simulation.trial import simulate
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.held_out import measured_wrench
-
-simulate = cache(simulate_anew)
-
-
-def person(*contacts: str) -> Estimator:
-    return Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male")), contacts=contacts)
-
-
-def with_forces(
-    recording: Recording, change: Callable[[np.ndarray], np.ndarray], which: int | None = None
-) -> Recording:
-    """Plates (one of them) with other axes of their own; centres of pressure stay."""
-
-    def of(k: int, plate: Plate) -> Plate:
-        if which not in (None, k):
-            return plate
-        force = change(plate.force)
-        moment = np.cross(np.nan_to_num(plate.cop), force) + plate.free_moment
-        return replace(plate, force=force, moment=np.where(np.isfinite(plate.cop), moment, 0.0))
-
-    return recording.with_plates(tuple(of(k, plate) for k, plate in enumerate(recording.plates)))
+from support.plates import person, prepared, shifted, trial, with_forces
 
 
 @pytest.mark.parametrize(
@@ -68,9 +47,9 @@ def with_forces(
     ],
 )
 def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: float) -> None:
-    whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
+    whole = trial(motion)
     late = brought_into_step(whole, Delay(-delay_s, 0.0))
-    ready, before = person().prepare(late), person().prepare(whole)
+    ready, before = person().prepare(late), prepared(motion)
     text = next(text for text in map(str, ready.messages) if "By the motion the plates" in text)
     side = "behind" if delay_s > 0.0 else "ahead of"
     (found,) = re.findall(rf"([0-9.]+) ms {side} the markers", text)
@@ -83,8 +62,7 @@ def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: f
 def test_plates_that_are_in_step_are_left_alone(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
     walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
-    for recording in (simulate("fullbody", "gait", 7, 4.0).recording, walk):
-        ready = person().prepare(recording)
+    for recording, ready in ((trial("gait"), prepared("gait")), (walk, person().prepare(walk))):
         assert plates_delay(Needed(ready.calibrated, recording.time, ready.markers), ready.wrench[:, :3]) is None
         assert bool(about(ready.messages, "in step")) == (recording is walk)  # 5 ms, as others of this laboratory
 
@@ -102,7 +80,7 @@ def test_plates_that_are_in_step_are_left_alone(data_dir: Path) -> None:
     ],
 )
 def test_plates_with_a_reversed_axis_are_refused(turn: list[float], which: int | None, said: str) -> None:
-    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    walk = trial("gait")
     up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
     signs = np.ones(3)
     signs[[k for k in range(3) if k != up]] = np.array(turn)[[0, 2]]
@@ -122,8 +100,8 @@ def test_feet_that_push_against_each_other_show_the_axes_though_their_sum_does_n
     matrix: np.ndarray, said: str
 ) -> None:
     """Only the lateral force, which a squat's centre of mass does not need."""
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
-    person().prepare(squat)  # as it is nothing is wrong
+    squat = trial("squat")
+    prepared("squat")  # as it is nothing is wrong
     up = int(np.argmax(np.abs(squat.plates[0].force).mean(axis=0)))
     level = [k for k in range(3) if k != up]
     mean = squat.plates[0].force[:, level].mean(axis=0)
@@ -172,7 +150,7 @@ def test_what_is_wrong_with_plates_names_the_file_of_the_forces(
 )
 def test_horizontal_forces_that_are_exchanged_are_named(sign: float, said: str) -> None:
     """A mirror: no turn of the axes gives it. The plates' axes lie a quarter turn from the laboratory's."""
-    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    walk = trial("gait")
     up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
     level = [k for k in range(3) if k != up]
 
@@ -185,20 +163,6 @@ def test_horizontal_forces_that_are_exchanged_are_named(sign: float, said: str) 
         person().prepare(with_forces(walk, change))
 
 
-def shifted(recording: Recording, along: int, by_m: float, which: int | None = None) -> Recording:
-    """Plates (one of them) that lie so far along an axis of the laboratory, in the file but not in truth."""
-    offset = by_m * np.eye(3)[along]
-
-    def of(k: int, plate: Plate) -> Plate:
-        if which not in (None, k):
-            return plate
-        corners = None if plate.corners is None else plate.corners + offset
-        moment = plate.moment + np.cross(offset, plate.force)
-        return replace(plate, cop=plate.cop + offset, moment=moment, corners=corners)
-
-    return recording.with_plates(tuple(of(k, plate) for k, plate in enumerate(recording.plates)))
-
-
 @pytest.mark.parametrize(
     ("by_m", "which", "said"),
     [
@@ -209,7 +173,7 @@ def shifted(recording: Recording, along: int, by_m: float, which: int | None = N
     ],
 )
 def test_plates_off_their_place_are_told_by_the_movement(by_m: float, which: int | None, said: str | None) -> None:
-    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    walk = trial("gait")
     up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
     pressed = walk.plates[0].cop[np.isfinite(walk.plates[0].cop).all(axis=1)]
     across = int(np.argmin(np.ptp(pressed, axis=0) + 9.0 * np.eye(3)[up]))
@@ -220,7 +184,7 @@ def test_plates_off_their_place_are_told_by_the_movement(by_m: float, which: int
 
 
 def test_a_declared_contact_that_bears_nothing_hides_no_plate_off_its_place() -> None:
-    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    walk = trial("gait")
     up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
     pressed = walk.plates[0].cop[np.isfinite(walk.plates[0].cop).all(axis=1)]
     across = int(np.argmin(np.ptp(pressed, axis=0) + 9.0 * np.eye(3)[up]))
@@ -254,8 +218,8 @@ def holding(recording: Recording, mass_kg: float) -> Recording:
 
 def test_a_force_that_both_feet_share_turns_no_plate(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the axis of one of them turned it cancels, and with it what the movement needs."""
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
-    shared = 30.0 * np.sin(2.0 * np.pi * 0.4 * squat.time)[:, None] * forward_of(squat)
+    squat = trial("squat")
+    shared = 30.0 * np.sin(2.0 * np.pi * 0.4 * squat.time)[:, None] * forward_of_squat()
     pushed = with_forces(squat, lambda force: force + shared)
     person().prepare(pushed)
     monkeypatch.setattr(axes, "EXPLAINS", np.inf)
@@ -265,7 +229,7 @@ def test_a_force_that_both_feet_share_turns_no_plate(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("mass_kg", [0.0, 1.0, 6.0, 12.0])
 def test_what_is_carried_in_the_hands_is_said(mass_kg: float) -> None:
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    squat = trial("squat")
     who = Subject(mass_kg=70.0 + mass_kg, height_m=1.75, sex="male")
     ready = Estimator(load_model("fullbody", who)).prepare(holding(squat, mass_kg))
     said = [message.text for message in about(ready.messages, "carried")]
@@ -289,7 +253,7 @@ def test_what_is_carried_in_the_hands_is_said(mass_kg: float) -> None:
 def test_a_load_that_one_hand_takes_up_is_carried(kg: float, first_s: float, end_s: float, told: bool) -> None:
     """The plate of that side gives more, and stays so: "plate 1 shows 10.30 times what plate 2 does", and the shoulder
     was 11 N m off, said to 1.3."""
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    squat = trial("squat")
     up = np.abs(squat.plates[0].force).mean(axis=0).argmax()
     more = np.zeros((squat.n_frames, 3))
     more[:, up] = kg * GRAVITY_M_S2 * np.interp(squat.time, [first_s - 0.2, first_s, end_s, end_s + 0.2], [0, 1, 1, 0])
@@ -302,7 +266,7 @@ def test_a_load_that_one_hand_takes_up_is_carried(kg: float, first_s: float, end
 @pytest.mark.parametrize("times", [0.96, 1.0, 1.01, 1.04, 1.08])
 def test_what_plates_carry_beyond_the_mass_may_be_in_the_hands(times: float) -> None:
     """A box of 2.9 kg had L5/S1 14 N m off, said to 6, under a clean verdict; nothing is said to be absent by it."""
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    squat = trial("squat")
     ready = person().prepare(with_forces(squat, lambda force: times * force))
     said = [message for message in about(ready.messages, "carried") if "more than the mass" in message.text]
     assert ready.ground.in_hands_kg == (pytest.approx(70.0 * (times - 1.0), abs=0.3) if times > 1.02 else 0.0)
@@ -339,7 +303,7 @@ def test_deviations_hold_what_the_hands_may_hold_and_nothing_is_absent_by_it() -
 
 def test_moments_that_bear_what_is_carried_are_absent() -> None:
     """Elbows were 7 N m off and said to 1."""
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    squat = trial("squat")
     who = Subject(mass_kg=82.0, height_m=1.75, sex="male")
     data = Estimator(load_model("fullbody", who)).run(holding(squat, 12.0), lag_s=0.0).data
     absent = {str(name) for name in data["coordinate"].values[(data["moment_source"].values == ABSENT).all(axis=0)]}
@@ -348,18 +312,18 @@ def test_moments_that_bear_what_is_carried_are_absent() -> None:
     assert data["moments"].sel(coordinate="elbow_flex_l").isnull().all()
 
 
-def forward_of(recording: Recording) -> np.ndarray:
+def forward_of_squat() -> np.ndarray:
     """Unit vector (3,), laboratory frame."""
-    ahead: np.ndarray = person().prepare(recording).calibrated.ground.vectors_to_laboratory(np.array([1.0, 0.0, 0.0]))
+    ahead: np.ndarray = prepared("squat").calibrated.ground.vectors_to_laboratory(np.array([1.0, 0.0, 0.0]))
     return ahead
 
 
 @pytest.mark.parametrize("each_n", [0.0, 2.0, 12.0, 20.0])
 def test_plates_that_were_not_zeroed_in_shear_are_told_and_deviations_hold_it(each_n: float) -> None:
     """12 N under each foot had hips 7 to 9 N m off, said to 3; with 15 the mass was called wrong and hips absent."""
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
-    off = each_n * forward_of(squat)
-    whole, ready = person().prepare(squat), person().prepare(with_forces(squat, lambda force: force + off))
+    squat = trial("squat")
+    off = each_n * forward_of_squat()
+    whole, ready = prepared("squat"), person().prepare(with_forces(squat, lambda force: force + off))
     said = [message.text for message in about(ready.messages, "zero")]
     assert len(said) == (each_n > 10.0) and not whole.ground.shear.notes
     assert not about(warnings_of(ready.messages), "weight")
@@ -379,21 +343,20 @@ def test_plates_that_were_not_zeroed_in_shear_are_told_and_deviations_hold_it(ea
 def test_a_declared_contact_switches_no_check_off(contact: str, each_n: float, told: bool, bears: bool) -> None:
     """Plates that were not zeroed are named where the moments say that nothing pulls at the hand. Where these do not
     tell, both may be: the hand bears by a prior, and the feet's deviations hold the zero."""
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
-    off = each_n * forward_of(squat)
+    squat = trial("squat")
+    off = each_n * forward_of_squat()
     ready = person(contact).prepare(with_forces(squat, lambda force: force + off))
     said = about(ready.messages, "zero")
     assert len(said) == 1 and bool(warnings_of(said)) == told
     assert ready.ground.bears.all() == ready.ground.bears.any() == bears
     assert np.hypot(*ready.ground.shear.zero) == pytest.approx(2.0 * each_n, abs=1.5)
-    assert not about(person(contact).prepare(squat).messages, "zero")
+    assert not about(prepared("squat", contact).messages, "zero")
 
 
 def test_what_a_declared_hand_may_bear_without_that_it_shows_is_held_by_deviations() -> None:
     """3 % of the weight in both hands had elbows 1.9 N m off, said to 0.9."""
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
-    assert person("hand_right").prepare(squat).ground.in_hands_kg == pytest.approx(0.03 * 70.0)
-    assert not person("seat").prepare(squat).ground.in_hands_kg
+    assert prepared("squat", "hand_right").ground.in_hands_kg == pytest.approx(0.03 * 70.0)
+    assert not prepared("squat", "seat").ground.in_hands_kg
 
 
 @pytest.mark.parametrize("zero_n", [0.0, 20.0])
@@ -414,7 +377,7 @@ def test_an_error_of_the_motion_that_each_step_repeats_is_no_zero_of_the_plates(
 
 @pytest.mark.parametrize(("gain", "told"), [(0.5, True), (0.9, False), (1.0, False), (1.5, True)])
 def test_shear_of_another_gain_is_told(gain: float, told: bool) -> None:
-    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    walk = trial("gait")
     up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
     gains = np.where(np.arange(3) == up, 1.0, gain)
     ready = person().prepare(with_forces(walk, lambda force: force * gains))
@@ -424,8 +387,8 @@ def test_shear_of_another_gain_is_told(gain: float, told: bool) -> None:
 
 def test_nothing_is_said_of_the_shear_of_real_plates(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
-    for trial in ("walking1", "squats1"):
-        recording = dynakin.read(folder / f"{trial}.trc", folder / f"{trial}_grf.mot")
+    for name in ("walking1", "squats1"):
+        recording = dynakin.read(folder / f"{name}.trc", folder / f"{name}_grf.mot")
         assert person().prepare(recording).ground.shear == NO_SHEAR
 
 
@@ -441,7 +404,7 @@ def faster(recording: Recording, factor: float) -> Recording:
 def test_a_rate_that_does_not_fit_the_forces_is_told_with_one_that_would(
     motion: str, factor: float, contacts: tuple[str, ...]
 ) -> None:
-    whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
+    whole = trial(motion)
     said = [message.text for message in about(person(*contacts).prepare(faster(whole, factor)).messages, "rate")]
     assert len(said) == 1 and f"at {100.0 * factor:.4g} Hz" in said[0] and "Correct the rate" in said[0]
     (fits,) = re.findall(r"About ([0-9.]+) Hz would fit", said[0])
@@ -477,7 +440,7 @@ WEIGHT = 70.0 * GRAVITY_M_S2
     ],
 )
 def test_another_unit_of_the_forces_of_a_walk_is_refused_and_named(one: float, unit: str) -> None:
-    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    walk = trial("gait")
     with pytest.raises(RecordingError, match=f"probably in {unit}: convert them to N in the file"):
         person().prepare(with_forces(walk, lambda force: force / one))
 
@@ -487,7 +450,7 @@ def test_forces_in_a_unit_that_makes_them_next_to_nothing_are_not_used_and_the_u
     one: float, unit: str
 ) -> None:
     """An idle plate that drifts looks the same: the recording is run as one without plates."""
-    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    walk = trial("gait")
     ready = person().prepare(with_forces(walk, lambda force: force / one))
     assert any("carry nobody" in text and f"in {unit}, not N" in text for text in map(str, ready.messages))
     assert not np.isfinite(ready.wrench).any()
@@ -495,23 +458,23 @@ def test_forces_in_a_unit_that_makes_them_next_to_nothing_are_not_used_and_the_u
 
 def test_another_unit_of_the_forces_of_a_squat_is_named() -> None:
     """It is no reason to refuse: who sits all the time bears as little on the feet."""
-    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    squat = trial("squat")
     ready = person().prepare(with_forces(squat, lambda force: 100.0 / WEIGHT * force))
     assert any("or the forces are in % of the body weight, not N" in text for text in map(str, ready.messages))
 
 
 def test_who_judges_takes_plates_in_step_too() -> None:
     """Held-out trials and identification ask for the plates by themselves."""
-    whole = simulate("fullbody", "gait", 7, 4.0).recording
+    whole = trial("gait")
     late = brought_into_step(whole, Delay(-0.04, 0.0))
-    calibrated = person().prepare(whole).calibrated
+    calibrated = prepared("gait").calibrated
     (there, _), (before, _) = measured_wrench(late, calibrated), measured_wrench(whole, calibrated)
     both = np.isfinite(there).all(axis=1) & np.isfinite(before).all(axis=1)
     assert np.abs(there[both] - before[both])[:, :3].mean() < 2.0
 
 
 def test_where_plates_end_before_they_are_not_known() -> None:
-    whole = simulate("fullbody", "gait", 7, 4.0).recording
+    whole = trial("gait")
     there = brought_into_step(whole, Delay(0.05, 0.0))
     assert np.isnan(there.plates[0].force[-3:]).all()  # for 20 ms the last one is held
     assert np.isfinite(there.plates[0].force[:-3]).all()
@@ -539,7 +502,7 @@ def legs_of(recording: Recording) -> Recording:
 @pytest.mark.parametrize("delay_s", [0.0, 0.02, -0.02, 0.04, -0.06, 0.12])
 def test_legs_alone_show_plates_that_are_out_of_step_by_the_vertical_force(delay_s: float) -> None:
     """By 20 ms a hip was 12 N m off, with nothing said and said to 3."""
-    walk = legs_of(simulate("fullbody", "gait", 7, 4.0).recording)
+    walk = legs_of(trial("gait"))
     ready = person().prepare(brought_into_step(walk, Delay(-delay_s, 0.0)))
     said = about(ready.messages, "in step")
     assert [message.level for message in said] == ["warning"] * (delay_s != 0.0)
@@ -554,7 +517,7 @@ def test_legs_alone_show_plates_that_are_out_of_step_by_the_vertical_force(delay
 
 def test_plates_that_nothing_judges_may_be_some_milliseconds_out_of_step() -> None:
     """One step on a plate: 20 ms late an ankle was 6.4 N m off, said to 1.2."""
-    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    walk = trial("gait")
     one, whole = (person().prepare(walk.with_plates(walk.plates[k:2])).ground for k in (1, 0))
     assert one.clock_sd_s == UNKNOWN_S and any("is not known here" in message.text for message in one.notes)
     assert whole.clock_sd_s == 0.0 or whole.behind_s

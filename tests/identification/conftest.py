@@ -7,7 +7,8 @@ import pytest
 from dynakin.identification.subject import Identification, identify_subject
 from dynakin.identification.trials import Common, measure_all
 from dynakin.simulation.trial import simulate
-from support.identification import Case, estimator
+from support.identification import Case
+from support.squat_estimator import estimator
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,8 @@ from dynakin.errors import ModelError
 from dynakin.identification.decision import parts_of, posteriors, rms_of
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.recordings.recording import Recording
-from support.identification import Case, estimator
+from support.identification import Case
+from support.squat_estimator import estimator
 
 
 def other_plates(recording: Recording, frames: slice) -> Recording:

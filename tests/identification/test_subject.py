@@ -19,7 +19,8 @@ from dynakin.messages import note, warning, warnings_of
 from dynakin.model.identified import IdentifiedSubject, read_identified, with_identified
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate
-from support.identification import Case, estimator
+from support.identification import Case
+from support.squat_estimator import estimator
 
 
 def test_a_subject_is_possible_weighs_the_same_and_survives_its_file(

@@ -10,7 +10,7 @@ import pytest
 import dynakin
 from dynakin.errors import RecordingError
 from dynakin.filter.augment import initial_covariance
-from dynakin.identification.decision import posteriors, rms_of
+from dynakin.identification.decision import estimate, rms_of
 from dynakin.identification.subject import Identification, identify_subject
 from dynakin.identification.trials import Common, measure_all
 from dynakin.model.inertia import RigidBody
@@ -43,7 +43,7 @@ def test_six_rows_fit_better_than_the_table_and_errors_are_about_the_feet(identi
     assert np.linalg.norm(trial.reference - [0.4, 0.0, 0.4]) < 0.3
     table, fitted = 0.0, 0.0
     for each in identified.trials:
-        before = posteriors(common, identified.trials, ["table"])["table"].wrench(common, each.movement.states)
+        before = estimate(common, identified.trials, "table").wrench(common, each.movement.states)
         table += float(rms_of(common, each, before) @ rms_of(common, each, before))
         after = rms_of(common, each, identified.posterior.wrench(common, each.movement.states))
         fitted += float(after @ after)
@@ -91,7 +91,7 @@ def test_a_walk_is_foretold_without_its_plates(identified: Identification) -> No
     plates = tuple(replace(plate, force=1.02 * plate.force, moment=0.9 * plate.moment) for plate in recording.plates)
     (changed,) = measure_all(common, [recording.with_plates(plates)])
     assert not np.array_equal(changed.wrench, walk.wrench, equal_nan=True)
-    said = posteriors(common, [squat], ["bodies"])["bodies"]
+    said = estimate(common, [squat], "bodies")
     for before, after in ((walk, changed), (walk.full_band(), changed.full_band())):
         wrenches = [said.wrench(common, each.movement.states) for each in (before, after)]
         np.testing.assert_array_equal(wrenches[1], wrenches[0])

@@ -36,7 +36,7 @@ def test_the_laboratory_leaves_the_ground_wrench_unchanged(
 ) -> None:
     R_LG = AXES[vertical] @ about_y(heading)
     recording = standing(rotation_LG=R_LG, origin_L=origin)
-    frame = find_ground_frame(recording, origin_L=origin)
+    frame = find_ground_frame(recording).with_origin(origin)
     assert frame.vertical == vertical
     np.testing.assert_allclose(frame.rotation, R_LG.T, atol=1e-9)
     np.testing.assert_allclose(np.linalg.det(frame.rotation), 1.0)
@@ -48,7 +48,7 @@ def test_the_laboratory_leaves_the_ground_wrench_unchanged(
 
 
 def test_there_and_back() -> None:
-    frame = find_ground_frame(standing(rotation_LG=AXES["+Z"] @ about_y(0.4)), origin_L=(0.3, -0.2, 0.1))
+    frame = find_ground_frame(standing(rotation_LG=AXES["+Z"] @ about_y(0.4))).with_origin((0.3, -0.2, 0.1))
     points, wrench = (
         np.random.default_rng(0).normal(size=(4, 5, 3)),
         np.random.default_rng(1).normal(size=(7, 6)),
@@ -61,7 +61,7 @@ def test_there_and_back() -> None:
 
 
 def test_wrench_moves_with_the_origin_by_hand() -> None:
-    frame = find_ground_frame(standing(), vertical="+Y", forward="+X", origin_L=(1.0, 0.0, 0.0))
+    frame = find_ground_frame(standing(), vertical="+Y", forward="+X").with_origin((1.0, 0.0, 0.0))
     # 100 N up at x = 3 m: 300 N m about Z at the laboratory's origin, 200 N m about one 1 m ahead
     np.testing.assert_allclose(frame.wrench_to_ground(np.array([0, 100.0, 0, 0, 0, 300.0])), [0, 100, 0, 0, 0, 200])
 

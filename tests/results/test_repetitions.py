@@ -11,7 +11,6 @@ import scipy
 
 import dynakin
 from dynakin.arrays import peaks
-from dynakin.errors import ConfigError
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.repetitions import (
@@ -105,7 +104,7 @@ def test_no_gait_cycle_spans_a_gap() -> None:
     assert right == pytest.approx([0.3, 1.4, 3.6, 4.7], abs=0.011)  # not the one from 2.5 to 3.6 s
 
 
-def test_the_kind_of_movement_is_told_from_the_feet_or_given() -> None:
+def test_the_kind_of_movement_is_told_from_the_feet() -> None:
     paths = walking(TIME)
     assert feet_pass(paths) and find_repetitions(paths).movement == "gait"
     treadmill = replace(
@@ -114,9 +113,6 @@ def test_the_kind_of_movement_is_told_from_the_feet_or_given() -> None:
     assert len(find_repetitions(treadmill).items) == len(find_repetitions(paths).items)
     together = replace(paths, heels={side: np.zeros((len(TIME), 3)) for side in paths.heels})
     assert find_repetitions(together).movement == "squat"
-    assert find_repetitions(together, "gait").note == "No gait cycle was found."
-    with pytest.raises(ConfigError, match="movement is 'jump', expected squat or gait"):
-        find_repetitions(paths, "jump")  # type: ignore[arg-type]
 
 
 def test_repetitions_outside_the_window_do_not_count_and_the_note_says_what_was_found() -> None:

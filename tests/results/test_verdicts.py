@@ -35,16 +35,14 @@ def squat() -> Recording:
     return simulate("sagittal7", "squat", 6, 6.0, mass_kg=70.0, height_m=1.75, sex="male").recording
 
 
-def test_a_good_run_of_the_whole_body_is_called_so(walk: Recording) -> None:
-    found = run("fullbody", walk)
-    assert found.noise == "calibrated" and found.judgement == "consistent"
-    assert found.verdict == "The standard deviations fit this recording, to which the noise was calibrated."
-
-
-def test_a_good_planar_run_is_called_so(squat: Recording) -> None:
-    found = run("sagittal7", squat)
-    assert found.noise == "declared" and found.judgement == "consistent"
-    assert found.verdict == "The standard deviations fit this recording."
+@pytest.mark.parametrize(
+    ("model", "trial", "noise", "more"),
+    [("fullbody", "walk", "calibrated", ", to which the noise was calibrated"), ("sagittal7", "squat", "declared", "")],
+)
+def test_a_good_run_is_called_so(request: pytest.FixtureRequest, model: str, trial: str, noise: str, more: str) -> None:
+    found = run(model, request.getfixturevalue(trial))
+    assert found.noise == noise and found.judgement == "consistent"
+    assert found.verdict == f"The standard deviations fit this recording{more}."
 
 
 def test_a_scale_that_is_not_this_recordings_is_found_out(walk: Recording) -> None:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from types import ModuleType
-
 import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError
-from dynakin.simulation.bodies import sagittal, squat_chain
+from dynakin.simulation.bodies.planar import SAGITTAL7, SQUAT7, Planar
 from dynakin.simulation.bodies.subject import Spread, affine, draw_subject, mass_com_inertia, pseudo_inertia
 
 
-@pytest.mark.parametrize("chain", [sagittal, squat_chain])
+@pytest.mark.parametrize("chain", [SAGITTAL7, SQUAT7])
 @pytest.mark.parametrize("sex", ["male", "female", None])
 @pytest.mark.parametrize("seed", range(5))
-def test_masses_add_up_and_every_body_is_possible(seed: int, sex: str | None, chain: ModuleType) -> None:
+def test_masses_add_up_and_every_body_is_possible(seed: int, sex: str | None, chain: Planar) -> None:
     subject = draw_subject(np.random.default_rng(seed), 63.2, 1.68, sex)
     bodies = chain.segment_bodies(subject)
     assert sum(J[3, 3] for J in bodies.values()) == pytest.approx(63.2, rel=1e-12)
@@ -30,7 +28,7 @@ def test_the_same_subject_weighs_the_same_in_both_chains() -> None:
     """Straight, both chains are one and the same mass distribution: their sums about the toe are equal."""
     subject = draw_subject(np.random.default_rng(4), 70.0, 1.75, "male")
     total = []
-    for chain in (sagittal, squat_chain):
+    for chain in (SAGITTAL7, SQUAT7):
         whole, at = np.zeros((4, 4)), {None: np.zeros(3)}
         for segment in chain.build_tree(subject):
             at[segment.name] = at[segment.parent] + segment.placement
@@ -42,8 +40,8 @@ def test_the_same_subject_weighs_the_same_in_both_chains() -> None:
 def test_the_ten_numbers_are_those_of_the_tree() -> None:
     """Against second moments of mass: the tensor about the origin is trace(S) 1 - S."""
     subject = draw_subject(np.random.default_rng(3), 70.0, 1.75, "male")
-    bodies = sagittal.segment_bodies(subject)
-    named = sagittal.build_body(subject, np.random.default_rng(0)).parameters()
+    bodies = SAGITTAL7.segment_bodies(subject)
+    named = SAGITTAL7.build_body(subject, np.random.default_rng(0)).parameters()
     for name, J in bodies.items():
         S, h, m = J[:3, :3], J[:3, 3], J[3, 3]
         tensor = np.trace(S) * np.eye(3) - S
@@ -56,7 +54,7 @@ def test_the_ten_numbers_are_those_of_the_tree() -> None:
 
 def test_without_spread_it_is_the_table() -> None:
     one, other = (
-        sagittal.build_body(
+        SAGITTAL7.build_body(
             draw_subject(np.random.default_rng(s), 70.0, 1.75, "male", Spread.none()), np.random.default_rng(s)
         ).parameters()
         for s in (1, 2)

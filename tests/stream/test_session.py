@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import dynakin
 from dynakin.errors import ModelError, StreamError
 from dynakin.filter.samples import sample_arrays
 from dynakin.recordings.recording import Recording
@@ -26,16 +25,12 @@ from dynakin.stream.sinks.recorder import Recorder, recorded
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, Streams
 from dynakin.stream.sources.replay import Replay
 from dynakin.stream.start import quietest
+from support.squat_estimator import estimator
 
 
 @pytest.fixture(scope="module")
 def squat() -> Recording:
     return simulate_squat(seed=1, duration_s=8.0).recording
-
-
-def estimator() -> dynakin.Estimator:
-    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    return dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject, markers="opencap"))
 
 
 def run(source: object, **options: object) -> tuple[list[LiveFrame], list[str], Live]:

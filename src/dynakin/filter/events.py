@@ -26,9 +26,7 @@ FOUND_S = 0.05
 the wrist for 0.02 s."""
 
 
-def events_of(
-    data: xr.Dataset, parameters: list[Parameter], initial: CalibratedModel, unseen_sd: float | None = None
-) -> list[Event]:
+def events_of(data: xr.Dataset, parameters: list[Parameter], initial: CalibratedModel, unseen_sd: float) -> list[Event]:
     """Events in the order of their times; one a stretch, not one a frame."""
     time = data["time"].values
     back, sought = _coming_back(data, initial.spec)
@@ -120,10 +118,8 @@ def _tracking(data: xr.Dataset, sought: Flags) -> list[Event]:
     return events + _stretches(time, unmet, "note", "bounds", "not all kept at once, each kept by itself")
 
 
-def _held(data: xr.Dataset, unseen_sd: float | None) -> list[Event]:
+def _held(data: xr.Dataset, unseen_sd: float) -> list[Event]:
     """Coordinates that no marker observed for so long that the filter stopped carrying them on."""
-    if unseen_sd is None:
-        return []
     following = data["tracking"].values == TRACKING.index("following")
     unsure = data["coordinates_sd"].values > 0.4 * unseen_sd  # the plates say a little even of what is held
     return [

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Flags = npt.NDArray[np.bool_]
-Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
 
 

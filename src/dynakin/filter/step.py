@@ -182,11 +182,7 @@ def step_estimate(
 
 
 def deviations_of(
-    model: _core.Model,
-    x: Array,
-    covariance: Array,
-    feet: _core.ContactLoads | None = None,
-    plates_sd: Array | None = None,
+    model: _core.Model, x: Array, covariance: Array, feet: _core.ContactLoads | None, plates_sd: Array | None
 ) -> dict[str, Array]:
     """Standard deviations of a state's outputs: J P J' for moments and wrench.
 

@@ -112,14 +112,14 @@ def estimate(common: Common, trials: Sequence[MeasuredTrial], use: Use) -> Poste
     return at_start(unknowns) if use == "table" else identify_batch(common, trials, unknowns)
 
 
-def posteriors(common: Common, others: Sequence[MeasuredTrial], uses: Sequence[Use] = USES) -> dict[Use, Posterior]:
+def posteriors(common: Common, others: Sequence[MeasuredTrial]) -> dict[Use, Posterior]:
     """What trials say, by candidate; of another trial's plates nothing, whose movement they are then given
     (`Posterior.wrench` of its states).
 
     Raises:
         RecordingError: they have too few frames with the plates' wrench.
     """
-    return {use: estimate(common, others, use) for use in uses}
+    return {use: estimate(common, others, use) for use in USES}
 
 
 def rms_of(common: Common, trial: MeasuredTrial, predicted: Array) -> Array:

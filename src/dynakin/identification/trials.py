@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import filled
 from dynakin.bindings import _core
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
@@ -20,7 +21,7 @@ from dynakin.messages import Message, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.companions import another_person
-from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
 from dynakin.recordings.times import step_of
@@ -261,10 +262,8 @@ def middle_of(count: int) -> int:
 def mean_centre_of_pressure(wrench: Array) -> Array:
     """(3,) m on the ground, of a wrench (T, 6) about its origin; the origin where no frame is known."""
     known = wrench[np.isfinite(wrench).all(axis=1)]
-    if not len(known) or known[:, 1].mean() < LOADED_N:
-        return np.zeros(3)
-    force = known.mean(axis=0)
-    return np.asarray(np.array([force[5], 0.0, -force[3]]) / force[1])
+    x, z = filled(pressed_at(known.mean(axis=0))) if len(known) else (0.0, 0.0)
+    return np.array([x, 0.0, z])
 
 
 def _low_passed(time: Array, wrench: Array, middle: int) -> Array:

@@ -166,7 +166,7 @@ def inertia_prior(body: RigidBody, length: float, priors: Priors) -> dict[str, f
     return sd | {"mass": priors.mass_sd_fraction * body.mass, "izz": planar}
 
 
-def inertia_bounds(body: RigidBody, length: float, bounds: Bounds, worn_kg: float = 0.0) -> dict[str, Interval]:
+def inertia_bounds(body: RigidBody, length: float, bounds: Bounds, worn_kg: float) -> dict[str, Interval]:
     """(lower, upper) of each of the ten numbers."""
     share = _SDS * worn_kg / body.mass if body.mass > 0.0 else 0.0
     values = dict(zip(INERTIA_NAMES, body.vector, strict=True))

@@ -114,16 +114,14 @@ def find_ground_frame(
     *,
     vertical: str = "auto",
     forward: str | Sequence[float] | Array = "auto",
-    origin_L: npt.ArrayLike | None = None,
     pairs: FacingPairs = DEFAULT_PAIRS,
     static: Recording | None = None,
 ) -> GroundFrame:
-    """Find up and forward in a recording, or take what is given; the frame has X forward.
+    """Find up and forward in a recording, or take what is given; the frame has X forward and the laboratory's origin.
 
     Args:
         vertical: "auto" or a laboratory axis ("+Y", "-Z", ...).
         forward: "auto", a laboratory axis, or a vector (3,); only its horizontal part counts.
-        origin_L: (3,) m; the laboratory's own origin where not given.
         pairs: markers that show the facing direction; ``find_marker``'s rules for their spelling.
         static: the standing trial, which may show up where the person of the recording lies.
 
@@ -166,8 +164,7 @@ def find_ground_frame(
             how.append(f"Forward: the person faces {shown}; not followed.")
         how.append(f"Forward ({', '.join(f'{value:.3f}' for value in ahead + 0.0)}) in the laboratory: given.")
     rotation = np.vstack([ahead, up, np.cross(ahead, up)])
-    origin = np.zeros(3) if origin_L is None else np.asarray(origin_L, dtype=float)
-    return GroundFrame(rotation, origin, axis, ahead, tuple(how))
+    return GroundFrame(rotation, np.zeros(3), axis, ahead, tuple(how))
 
 
 def find_laboratory_frame(

@@ -21,8 +21,8 @@ from dynakin.recordings.feet.contact import (
 from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
 from dynakin.recordings.feet.soles import Soles
-from dynakin.recordings.plates.ground_plate import GroundPlate, level_pressure
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.pressure import JUDGED_N, pressed_at
 from dynakin.recordings.plates.stuck import STILL_N
 from dynakin.results.naming import sentence
 from dynakin.settings.noise import Noise
@@ -213,7 +213,7 @@ class LiveFeet:
     def _plates(self, wrenches: Array) -> list[GroundPlate]:
         loads = self.initial.ground.wrench_to_ground(wrenches)
         known = np.isfinite(loads).all(axis=1) & ~self._range.at_end(loads[:, 1])
-        cop = level_pressure(loads, self._floor_m)
+        cop = pressed_at(loads, self._floor_m)
         return [
             GroundPlate(name, loads[[p]], cop[[p]], known[[p]], None, self._floor_m)
             for p, name in enumerate(self.plates)

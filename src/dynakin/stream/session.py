@@ -7,7 +7,6 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from dynakin.blas import one_blas_thread
 from dynakin.errors import DivergenceError, ModelError, StreamError
@@ -28,8 +27,6 @@ from dynakin.stream.sinks.group import SinkGroup
 from dynakin.stream.sources.packets import Source
 from dynakin.stream.sources.reader import Notice, Reader
 from dynakin.stream.start import begin, check_labels, quietest, recording_of, stands, unknown_mass
-
-Array = npt.NDArray[np.float64]
 
 _POLL_S = 0.005
 _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is looked at

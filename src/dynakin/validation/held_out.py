@@ -103,7 +103,7 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
 
 
 def identify_on(
-    recording: Recording, setup: Setup, *, static: Recording | None = None, same_recording: bool = False
+    recording: Recording, setup: Setup, *, static: Recording | None = None, same_recording: bool
 ) -> IdentifyingTrial:
     """Run every preset on the identifying trial.
 

@@ -57,12 +57,7 @@ at the end of what is known, matter by 1 %."""
 
 
 def figures_in_space(
-    recording: Recording,
-    setup: Setup,
-    *,
-    static: Recording | None = None,
-    horizon_s: float = 0.1,
-    progress: Progress | None = None,
+    recording: Recording, setup: Setup, *, static: Recording | None, horizon_s: float, progress: Progress | None
 ) -> Figures:
     """All yardsticks on one trial of a floating model, over its window.
 

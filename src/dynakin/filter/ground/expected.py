@@ -23,7 +23,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import FootLoads
-from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
 from dynakin.settings.contacts import SEAT
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
@@ -179,10 +179,9 @@ def plate_errors(wrench: Array, contact: Array, off: Shear = NO_SHEAR, off_gain:
     Args:
         off_gain: (T,) part of its load by which the plate may be off, all of it or a sensor's `SENSOR_M` away.
     """
-    push, height = np.maximum(np.abs(wrench[:, 1]), LOADED_N), contact[:, 1]
-    z, x = (wrench[:, 2] * height - wrench[:, 3]) / push, (wrench[:, 0] * height + wrench[:, 5]) / push
-    loaded = (wrench[:, 1] > LOADED_N)[:, None]
-    pressure = np.where(loaded, np.stack([x, height, z], axis=1), contact)
+    push, pressure = np.maximum(np.abs(wrench[:, 1]), LOADED_N), contact.copy()
+    at = pressed_at(wrench, contact[:, 1])
+    pressure[:, [0, 2]] = np.where(np.isnan(at), contact[:, [0, 2]], at)
     shear = np.hypot(np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), off.sd(wrench))
     shear = np.hypot(shear, off_gain * np.hypot(wrench[:, 0], wrench[:, 2]))
     lift = np.hypot(PLATE_NOISE_N, np.hypot(PLATE_GAIN, off_gain) * push)

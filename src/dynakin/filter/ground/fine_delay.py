@@ -24,6 +24,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.inverse_kinematics import FEWEST_MARKERS, inverse_kinematics
 from dynakin.model.calibration.pose_start import bare
 from dynakin.model.inertia import INERTIA_NAMES
+from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.resampling import low_pass
 from dynakin.recordings.times import frame_numbers, on_grid, rate_of
 from dynakin.units import GRAVITY_M_S2
@@ -239,8 +240,8 @@ class _Needed(NamedTuple):
         """Rows H (C N, n + I + C) and values (C N,), over their noise (C,), of how plates (T, 6) differ from it in its
         ``part`` of the recording by n lags, inertia and a constant; moments about the mean centre of pressure."""
         measured = low_pass(plates[part], self.rate, CUTOFF_HZ)
-        load = measured.mean(axis=0)
-        centre = np.array([load[5], 0.0, -load[3]]) / load[1]
+        x, z = pressed_at(measured.mean(axis=0), least_n=-np.inf)
+        centre = np.array([x, 0.0, z])
         end = round(END_S * self.rate)
         inner = self.seen.copy()
         inner[:end] = inner[len(inner) - end :] = False

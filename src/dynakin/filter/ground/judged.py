@@ -27,7 +27,7 @@ from dynakin.filter.ground.declared import (
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.on_ground import OnGround
-from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion, pressed_at
+from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
 from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
@@ -37,7 +37,7 @@ from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
 from dynakin.settings.contacts import SEAT
 
 Array = npt.NDArray[np.float64]

@@ -11,10 +11,10 @@ from dynakin.arrays import filled
 from dynakin.bindings import _core
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.judged import Ground
-from dynakin.filter.ground.plate_sum import pressed_at
 from dynakin.filter.limbs import unseen_limbs
 from dynakin.messages import Message, about, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.results.naming import listed
 from dynakin.settings.contacts import SEAT
 from dynakin.units import GRAVITY_M_S2

@@ -18,7 +18,6 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.times import spans
 from dynakin.recordings.weight import likely_unit
@@ -211,12 +210,6 @@ def _undeclared_in_words(
             "sum is not used there.",
         )
     ), beyond
-
-
-def pressed_at(wrench: Array) -> Array:
-    """(T, 2) m, X and Z of where a wrench (T, 6) presses on the ground's plane, NaN where it does not."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(wrench[:, [1]] > LOADED_N, wrench[:, [5, 3]] * [1.0, -1.0] / wrench[:, [1]], np.nan)
 
 
 def _stands_alone(loads: FootLoads, k: int, frames: slice) -> bool:

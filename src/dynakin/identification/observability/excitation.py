@@ -20,6 +20,7 @@ from dynakin.bindings import _core
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.known_motion import Known, KnownMotion
 from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.times import step_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import words
@@ -123,8 +124,7 @@ class Bench:
     def loads(self, motion: Motion) -> tuple[Array, Array]:
         """Vertical force (T,) N and centre of pressure (T,) m, forward from the ground origin, of a motion."""
         wrench = np.stack([_core.wrench(self.measured.core, x) for x in self.states(motion)])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return wrench[:, 1], wrench[:, 5] / wrench[:, 1]
+        return wrench[:, 1], pressed_at(wrench, least_n=0.0)[:, 0]
 
     def possible(self, motion: Motion) -> bool:
         """Within the joints' limits, the feet loaded and the centre of pressure under them."""

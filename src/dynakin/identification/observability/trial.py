@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from dynakin.filter.augment import variance_scales
 from dynakin.filter.tracker import Tracker
@@ -17,8 +16,6 @@ from dynakin.progress import Progress
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.posterior import judged, posterior_figures, share_of
 from dynakin.settings.noise import Noise
-
-Array = npt.NDArray[np.float64]
 
 _MOST_FRAMES = 1000  # of the trial's motion for its condition number
 

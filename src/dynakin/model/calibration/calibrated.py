@@ -17,8 +17,7 @@ from dynakin.model.plan import ModelPlan
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import JointPrior
 from dynakin.recordings.frame import GroundFrame
-from dynakin.recordings.plates.ground_plate import level_pressure
-from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
 from dynakin.recordings.recording import Recording
 from dynakin.tree import Tree
 
@@ -118,11 +117,11 @@ class CalibratedModel(StartingState):
         contacts: name -> segment, of the contacts that are declared in addition to the feet (a seat, hands on a rail).
         markers_of_fixed_feet: of a model fixed in the ground: "right", "left" -> the recording's names of the markers
             on that foot, whichever of them are sites.
-        unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
-            added to the noise of the cameras.
+        unmodelled_m: (M,) or one for all, m: standard deviation of what neither a state nor the cameras explain of each
+            marker; it is added to the noise of the cameras.
         skin_lasts: how many times longer skin stays displaced than the noise settings say of a floating model.
         dimensionless: geometry parameters that are factors, not lengths.
-        carried_kg: mass of the known loads (`model.calibration.loads`), not in ``mass_kg``.
+        carried_kg: mass of the known loads (`declared.with_loads`), not in ``mass_kg``.
         height_stated: whether the height is somebody's word, and not estimated from markers.
         own_inertia: whether inertia was identified of this person, and is not the table's.
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
@@ -277,5 +276,5 @@ def first_centre_of_pressure(recording: Recording, ground: GroundFrame) -> Array
     loaded = wrench[on][recording.time[on] < recording.time[on[:1]] + 1.0]
     if not len(loaded):
         return np.zeros(3)
-    x, z = level_pressure(loaded.mean(axis=0)[None], 0.0)[0]
+    x, z = pressed_at(loaded.mean(axis=0))
     return np.array([x, 0.0, z])

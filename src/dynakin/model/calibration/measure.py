@@ -58,8 +58,6 @@ from dynakin.recordings.standing import MIN_STILL_S, standing_window
 from dynakin.recordings.vertical import against_vertical
 from dynakin.settings.subject import Subject
 
-Array = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Asked:

@@ -228,11 +228,6 @@ class Deviations:
         """How far it all is from a body, counted once a pair."""
         return 0.5 * float(self.total.sum())
 
-    @property
-    def of_marker(self) -> Array:
-        """(n,) the share that each marker has a part in."""
-        return np.asarray(self.total.sum(axis=1))
-
 
 def deviations(found: Found, expected: Expected, height_m: float) -> Deviations:
     """Deviations of what is found from what is expected of a person of this height."""

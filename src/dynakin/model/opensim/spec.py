@@ -7,7 +7,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import Coupled
@@ -117,9 +116,6 @@ def to_spec(
 def _axis(axis: ChainAxis) -> _core.AxisSpec:
     functions = [_core.FunctionSpec(f.kind, f.coefficients, f.x, f.y) for f in axis.functions]
     return _core.AxisSpec(axis.coordinate, axis.kind, axis.direction, list(axis.coefficients), axis.scale, functions)
-
-
-Array = npt.NDArray[np.float64]
 
 
 def in_radians(source: OpenSimModel) -> frozenset[str]:

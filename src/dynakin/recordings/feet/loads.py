@@ -126,7 +126,7 @@ def divided(
     off: Flags,
     hidden: Flags,
     aloft: Flags,
-    given: Mapping[int, tuple[str, ...]] | None = None,
+    given: Mapping[int, tuple[str, ...]],
 ) -> FootLoads:
     """The plates' wrenches given to the feet that stand on them.
 
@@ -136,7 +136,6 @@ def divided(
             stand anywhere: nobody sees it. aloft: (T, F) it is in the air by its markers.
         given: as of `FootLoads`.
     """
-    given = dict(given or {})
     n, F = off.shape
     of_feet = [p for p in range(len(plates)) if p not in given]  # plates that only feet stand on
     owners = on[:, :, of_feet]  # (T, F, P)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.arrays import filled, runs
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N, Surface, centre_of_pressure
+from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N, pressed_at
 from dynakin.recordings.recording import Array, Plate, Recording
 
 Flags = npt.NDArray[np.bool_]
@@ -53,7 +53,7 @@ class GroundPlate:
         known = np.asarray(np.isfinite(wrench).all(axis=1)) & ~saturated(wrench[:, 1])
         corners = None if plate.corners is None else ground.points_to_ground(plate.corners)[:, [0, 2]]
         height = surface_height(plate, ground)
-        return cls(plate.name, wrench, level_pressure(wrench, height or 0.0), known, corners, height)
+        return cls(plate.name, wrench, pressed_at(wrench, height or 0.0), known, corners, height)
 
     @cached_property
     def push(self) -> Array:
@@ -103,15 +103,6 @@ def floor_height(recording: Recording, ground: GroundFrame) -> float:
         return zero
     lowest = float(np.percentile(np.where(np.isfinite(heights), heights, np.inf).min(axis=1), 5.0))
     return zero if -UNDER_MARKERS_M <= lowest - zero <= SHOE_M or not np.isfinite(lowest) else lowest - UNDER_MARKERS_M
-
-
-def level_pressure(wrench: Array, height_m: float) -> Array:
-    """Centres of pressure (T, 2) m [X, Z] of wrenches (T, 6) on a level plane; NaN where they are not loaded."""
-    surface = Surface(np.array([0.0, height_m, 0.0]), np.array([0.0, 1.0, 0.0]))
-    known = filled(wrench)
-    cop = centre_of_pressure(known[:, :3], known[:, 3:], surface, LOADED_N)[0][:, [0, 2]]
-    cop[known[:, 1] < LOADED_N] = np.nan
-    return cop
 
 
 def saturated(push: Array) -> Flags:

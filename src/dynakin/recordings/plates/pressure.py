@@ -1,5 +1,5 @@
-"""A plate's wrench, its centre of pressure and free moment: the two ways of writing one and the same
-thing."""
+"""A plate's wrench, its centre of pressure and free moment: the two ways of writing one and the same thing; and where a
+wrench presses on a level plane."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.arrays import cross
+from dynakin.arrays import cross, filled
 from dynakin.recordings.recording import Array, Plate
 
 UNLOADED_N = 10.0
@@ -51,6 +51,14 @@ def centre_of_pressure(force: Array, moment: Array, surface: Surface, threshold_
     free = np.zeros_like(force)
     free[loaded] = np.outer((moment_c[loaded] - cross(r[loaded], force[loaded])) @ n, n)
     return c + r, free
+
+
+def pressed_at(wrench: Array, height_m: float | Array = 0.0, least_n: float = LOADED_N) -> Array:
+    """Centres of pressure (..., 2) m, X and Z, of wrenches (..., 6) about the ground's origin on the level plane
+    y = ``height_m``, one or (...); NaN where the push is below ``least_n``. What is not known counts as 0."""
+    fx, fy, fz, mx, _, mz = np.moveaxis(filled(wrench), -1, 0)
+    push = np.where(fy >= least_n, fy, np.nan)
+    return np.stack([mz + fx * height_m, fz * height_m - mx], axis=-1) / push[..., None]
 
 
 def plate_from_wrench(

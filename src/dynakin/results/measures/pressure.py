@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import wrench_about
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, surface_height
 from dynakin.recordings.plates.ground_plate import floor_height as recorded_floor
-from dynakin.recordings.plates.pressure import LOADED_N, Surface
-from dynakin.recordings.plates.pressure import centre_of_pressure as recorded_pressure
+from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
 from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]
@@ -28,14 +26,11 @@ def centre_of_pressure(wrench: Array, height_m: float | Array, threshold_n: floa
     """
     wrench = np.asarray(wrench, dtype=float)
     known = np.isfinite(wrench)
-    filled = np.where(known, wrench, 0.0)
-    up = np.zeros(3) + np.asarray(height_m)[..., None] * [0.0, 1.0, 0.0]
-    force, moment = np.split(wrench_about(filled, up), 2, axis=-1)  # about the plane's own origin
-    point, free = recorded_pressure(force, moment, Surface(np.zeros(3), np.array([0.0, 1.0, 0.0])), threshold_n)
-    in_plane, across = known[..., [0, 1, 5]].all(axis=-1), known[..., 1:4].all(axis=-1)
-    pushed = known[..., 1] & (filled[..., 1] >= threshold_n)
-    given = np.stack([in_plane, known[..., 1], across], axis=-1) & pushed[..., None]
-    return np.where(given, point + up, np.nan), np.where(known.all(axis=-1) & pushed, free[..., 1], np.nan)
+    x, z = pressed_at(wrench, height_m, threshold_n).T
+    free = wrench[:, 4] - (z * wrench[:, 0] - x * wrench[:, 2])
+    given = np.stack([known[:, [0, 1, 5]].all(axis=1), np.isfinite(x), known[:, 1:4].all(axis=1)], axis=1)
+    point = np.stack([x, np.broadcast_to(height_m, x.shape), z], axis=1)
+    return np.where(given, point, np.nan), np.where(known.all(axis=1), free, np.nan)
 
 
 def foot_pressure(estimate: Estimate, foot: str | None = None) -> tuple[Array, Array]:
@@ -67,5 +62,5 @@ def support_height(estimate: Estimate, wrench: Array) -> float | Array:
 
 
 def floor_height(estimate: Estimate) -> float:
-    """Height (m, ground frame) of the floor; see `recordings.plates.surfaces`."""
+    """Height (m, ground frame) of the floor; see `ground_plate.floor_height`."""
     return recorded_floor(estimate.recording, estimate.ground)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import peaks, runs
-from dynakin.errors import ConfigError, RecordingError
+from dynakin.errors import RecordingError
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, find_marker
 from dynakin.recordings.recording import Recording
@@ -104,21 +104,13 @@ def repetitions_of(estimate: Estimate) -> Found:
     return find_repetitions(paths, window=evaluation_window(estimate.time))
 
 
-def find_repetitions(
-    paths: BodyPaths, movement: Movement | None = None, window: npt.NDArray[np.bool_] | None = None
-) -> Found:
-    """Whole squats or gait cycles.
+def find_repetitions(paths: BodyPaths, window: npt.NDArray[np.bool_] | None = None) -> Found:
+    """Whole gait cycles where the feet pass one another, else whole squats.
 
     Args:
-        movement: "squat" or "gait"; None: gait where the feet pass one another, else squat.
         window: (T,) frames that a repetition must lie in; None: all.
-
-    Raises:
-        ConfigError: an unknown movement.
     """
-    kind = movement or ("gait" if feet_pass(paths) else "squat")
-    if kind not in ("squat", "gait"):
-        raise ConfigError(f"movement is {kind!r}, expected squat or gait")
+    kind: Movement = "gait" if feet_pass(paths) else "squat"
     what = "squat" if kind == "squat" else "gait cycle"
     try:
         every = squats(paths.time, paths.pelvis[:, 1]) if kind == "squat" else gait_cycles(paths)
@@ -126,7 +118,7 @@ def find_repetitions(
         return Found(kind, (), f"No {what} was sought: {error.message}")
     kept = tuple(r for r in every if window is None or window[r.first : r.last + 1].all())
     if not kept:
-        lacks = not np.isfinite(paths.pelvis).any() or (kind == "gait" and not paths.heels)
+        lacks = not np.isfinite(paths.pelvis).any()
         why = "the recording has no pelvis markers" if lacks and kind == "squat" else "no pelvis or heel markers"
         return Found(kind, (), f"No {what} was found{f': {why}' if lacks else ''}.")
     after = "" if window is None or window.all() else " after the adaptation"

@@ -8,14 +8,15 @@ import numpy as np
 
 from dynakin.errors import ConfigError
 from dynakin.settings.strict import nearest
-from dynakin.simulation.bodies import sagittal, squat_chain, whole_body
+from dynakin.simulation.bodies import whole_body
 from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.planar import SAGITTAL7, SQUAT7
 from dynakin.simulation.bodies.subject import SimulatedSubject, Spread, draw_subject
 from dynakin.simulation.streams import Streams
 
 BODIES: dict[str, Callable[[SimulatedSubject, np.random.Generator], SimulatedBody]] = {
-    "sagittal7": sagittal.build_body,
-    "squat7": squat_chain.build_body,
+    "sagittal7": SAGITTAL7.build_body,
+    "squat7": SQUAT7.build_body,
     "fullbody": whole_body.build_body,
 }
 """Bodies by the name of the model whose coordinates they have: built of a subject, markers put on with the

@@ -14,8 +14,7 @@ from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.filter.step import Labelled
 from dynakin.model.schema import kinds_of
-from dynakin.recordings.plates.ground_plate import level_pressure
-from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
 from dynakin.stream.sinks.base import LiveFrame, Started, Status
 from dynakin.tree import Tree
 
@@ -146,5 +145,5 @@ def arrow(wrench: Array) -> Array:
     """Centre of pressure (3,) m on the ground's plane y = 0 and force (3,) N of a wrench (6,); NaN where unloaded."""
     if not np.isfinite(wrench).all() or wrench[1] < LOADED_N:
         return np.full(6, np.nan)
-    x, z = level_pressure(wrench[None], 0.0)[0]
+    x, z = pressed_at(wrench)
     return np.array([x, 0.0, z, *wrench[:3]])

@@ -167,12 +167,7 @@ def _stamp(file: Path) -> str:
 
 
 def run_batch(
-    dataset: Dataset,
-    options: Options,
-    pool: Pool,
-    *,
-    journal: Journal | None = None,
-    progress: Progress | None = None,
+    dataset: Dataset, options: Options, pool: Pool, *, journal: Journal | None, progress: Progress | None
 ) -> Batch:
     """Work on all trials; what is wrong with one is kept in ``failures`` and stops nothing."""
     tasks = [Task(session.name, session) for session in dataset.sessions]

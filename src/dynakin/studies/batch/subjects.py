@@ -83,7 +83,7 @@ def identify_on_trials(options: IdentifyOptions, payload: Sequence[Session]) -> 
 
 
 def identify_subjects(
-    dataset: Dataset, pool: Pool, *, journal: Journal | None = None, progress: Progress | None = None
+    dataset: Dataset, pool: Pool, *, journal: Journal | None, progress: Progress | None
 ) -> dict[str, dict[str, Any]]:
     """Rows of `identify_on_trials` by subject. One that fails unexpectedly keeps the table, and says why; that is kept
     in the journal, so that a batch that goes on works on all trials of a subject alike."""

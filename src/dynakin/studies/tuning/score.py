@@ -67,19 +67,12 @@ def score_task(shared: Shared, payload: tuple[int, Mapping[str, float]]) -> dict
     return figures
 
 
-def run_score(trial: TuningTrial, noise: Noise, trace: bool = False) -> dict[str, Any]:
-    """The core's sums over the trial's frames that count; see `_core.Filter.score`."""
-    _, _, core = core_filter(trial.initial, noise, trial.estimate)
-    found: dict[str, Any] = core.score(
-        trial.time, trial.markers, trial.wrench, trial.first, trial.end, ahead=trial.ahead, lost_m=LOST_M, trace=trace
-    )
-    return found
-
-
 def figures_of(trial: TuningTrial, noise: Noise, declared: Noise) -> dict[str, Any]:
     """Figures as of `score_task`. declared: the settings whose sigmas are the units of ``sigma``: not those that are
     being tried, or the largest would win."""
-    return figures_from(run_score(trial, noise), trial, declared)
+    _, _, core = core_filter(trial.initial, noise, trial.estimate)
+    sums = core.score(trial.time, trial.markers, trial.wrench, trial.first, trial.end, ahead=trial.ahead, lost_m=LOST_M)
+    return figures_from(sums, trial, declared)
 
 
 def figures_from(sums: Mapping[str, Any], trial: TuningTrial, declared: Noise) -> dict[str, Any]:

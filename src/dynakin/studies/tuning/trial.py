@@ -46,10 +46,6 @@ class TuningTrial:
     ahead: int
     estimate: tuple[Quantity, ...] = QUANTITIES
 
-    def counted(self, first: int, end: int) -> TuningTrial:
-        """The same, judged on other frames."""
-        return replace(self, first=first, end=end)
-
     def halves(self) -> tuple[TuningTrial, TuningTrial]:
         """The frames that count in two: the second half's figures then go on from what the first half taught."""
         middle = (self.first + self.end) // 2
