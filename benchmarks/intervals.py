@@ -30,7 +30,8 @@ from source_digest import source_digest
 
 import dynakin
 from dynakin.filter.contacts import any_off_plates
-from dynakin.filter.error_sizes import LANDMARKS, SCALED, Sizes, usual_sizes
+from dynakin.filter.error_sizes import LANDMARKS, SCALED, Sizes, hips_unshown, usual_sizes
+from dynakin.filter.joint_errors import hips_turned
 from dynakin.filter.reported_sd import BLOCKS, Parts, reported
 from dynakin.filter.skin import skin_found
 from dynakin.filter.systematic import Systematic
@@ -64,7 +65,8 @@ class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
     error at size 1; (T,) intensity of the movement and how far markers are moved; (T, C) where moments come from,
     and whether some foot stands off the plates. Frames that have no truth or no value are NaN. ``late``: whether
-    later frames helped. ``skin``: as of `skin_found`."""
+    later frames helped. ``skin``: as of `skin_found`. ``hips``: as of
+    `hips_unshown`."""
 
     case: str
     seed: int
@@ -81,6 +83,7 @@ class Run:
     late: bool
     step_s: float
     skin: float
+    hips: float
 
 
 def runs_of(
@@ -191,6 +194,7 @@ def against(
         bool(tracked.estimate.config["lag_s"]),
         step_of(data["time"].values),
         skin_found(tracker.calibrated, {name: data[name].values for name in ("state", "tracking")}),
+        hips_unshown(hips_turned(tracker.calibrated, values_of(data, "state"))),
     )
 
 
@@ -219,7 +223,7 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     if sizes is not None:
         over_time = run.intensity, run.moved_m, run.sources
         said = reported(
-            sizes.with_skin(run.skin), run.variance_scale, run.own, run.parts, *over_time,
+            replace(sizes, hips=run.hips).with_skin(run.skin), run.variance_scale, run.own, run.parts, *over_time,
             off_plates=run.off_plates, late=run.late, step_s=run.step_s,
         )  # fmt: skip
     for title, block, places in groups_of(run):

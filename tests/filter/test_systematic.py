@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates
-from dynakin.filter.error_sizes import KINDS, LANDMARKS, OF_JOINTS, SCALED, Sizes, usual_sizes
+from dynakin.filter.error_sizes import KINDS, LANDMARKS, OF_JOINTS, SCALED, SHOWS_HIPS_RAD, Sizes, usual_sizes
 from dynakin.filter.in_hands import HANDS, Hands
-from dynakin.filter.joint_errors import OF_ROOT, JointErrors, neutral, trunks_of
+from dynakin.filter.joint_errors import OF_ROOT, JointErrors, hips_turned, neutral, trunks_of
 from dynakin.filter.reported_sd import (
     BLOCKS,
     OWN_AT_ONCE,
@@ -32,6 +32,7 @@ from dynakin.filter.systematic import _STEP_S, ROOT_SKIN, Systematic
 from dynakin.model.calibration.calibrated import Provenance
 from dynakin.model.calibration.declared import with_loads
 from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
+from dynakin.model.spec import free_names
 from dynakin.model.state_priors import COMMON_SKIN
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
@@ -52,10 +53,10 @@ CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
 RATE = np.array([-900.0, 4000.0, 300.0, 200.0, 100.0, 700.0])
 """By how much the contact changes, N and N m a second."""
-SIZES = (0.01, 0.02, 0.025, 0.03, 0.05, 0.04, 0.06, 0.07, 0.09, 0.008, 0.3, 0.015, 0.5, 0.004, 2.0)
+SIZES = (0.01, 0.02, 0.025, 0.03, 0.05, 0.04, 0.06, 0.07, 0.09, 0.008, 0.3, 0.015, 0.5, 0.004, 2.0, 0.7)
 MOVING, MOMENTS_MOVING, OFF_PLATES = 0.1, 0.05, 0.2
 NONE = Sizes(
-    *np.zeros(len(SIZES) - 1),
+    *np.zeros(len(SIZES) - 2),
     skin_found=1.0,
     placed=np.inf,
     own_speeds=MOVING,
@@ -125,6 +126,7 @@ def calibrated() -> Any:
         tree=Tree.of(model.segments),
         names=tuple(_core.Model(model).layout.names),
         x0=_core.Model(model).initial_state(),
+        sd0=np.zeros(_core.Model(model).layout.size),
         plan=None,
         feet={"right": "shank"},
         soft_tissue_m=DECLARED,
@@ -479,7 +481,7 @@ def with_inertia() -> tuple[Any, Array]:
     segments[2].inertia_estimated = [True] * 4 + [False] * 6
     model.segments = segments
     subject, core = calibrated(), _core.Model(model)
-    subject.spec, subject.names = model, tuple(core.layout.names)
+    subject.spec, subject.names, subject.sd0 = model, tuple(core.layout.names), np.zeros(core.layout.size)
     subject.lower, subject.upper = np.full(34, -np.inf), np.full(34, np.inf)
     return subject, np.r_[Q, QD, QDD, core.initial_state()[30:]]
 
@@ -763,6 +765,29 @@ def test_the_spine_is_no_joint_of_one_centre() -> None:
     bending = person.names.index("lumbar_bending")
     spine, hips = (parts[kind]["coordinates"][bending] for kind in ("spine_centre", "ball_centre"))
     assert spine > 10.0 * hips and LANDMARKS.spine_centre > 10.0 * LANDMARKS.ball_centre
+
+
+def test_hips_that_do_not_turn_stay_where_a_regression_has_them() -> None:
+    standing = measured()
+    subject, spec = Systematic(standing, Noise()), standing.spec
+    K = len(free_names(spec))
+    q, still = standing.x0[:K], np.zeros(K)
+    external = np.zeros((len(spec.segments), 6))
+    external[[s.name for s in spec.segments].index(standing.feet["right"])] = [0.0, 700.0, 0.0, 0.0, 0.0, 0.0]
+    names = [c.name for c in spec.coordinates]
+    flexion, knee, other = (names.index(n) for n in ("hip_flexion_r", "knee_angle_r", "hip_flexion_l"))
+    sd = np.sqrt(subject.parts(q, still, still, external)["hips"]["moments"])
+    assert sd[flexion] == pytest.approx(700.0 * standing.sd0[standing.names.index("length/hip_forward")], rel=0.15)
+    assert sd[knee] < 0.3 * sd[flexion] and sd[other] < 0.3 * sd[flexion]
+    turns = [0.0, SHOWS_HIPS_RAD, np.inf]
+    found = [subject.with_found(0.0, hips_turned=turned).sizes.hips for turned in turns]
+    np.testing.assert_allclose(found, [1.0, np.sqrt(0.5), 0.0])
+    moving = np.zeros((3, K))
+    moving[:, names.index("hip_flexion_r")] = [-0.1, 0.0, 0.1]  # both legs: rms of one alone over root 2
+    assert hips_turned(standing, moving) == pytest.approx(np.sqrt(0.02 / 3.0 / 2.0))
+    assert hips_turned(calibrated(), np.zeros((0, 10))) == np.inf
+    scaled = Systematic(replace(standing, plan=None), Noise())  # an .osim is scaled by somebody: no regression
+    assert not scaled.parts(q, still, still, external)["hips"]["moments"].any()
 
 
 def test_more_skin_than_usual_counts_for_more_and_less_for_no_less() -> None:

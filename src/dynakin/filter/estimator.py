@@ -20,6 +20,7 @@ from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.ground.known import known_ground
 from dynakin.filter.ground.place import off_place
+from dynakin.filter.joint_errors import hips_turned
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, marker_paths, total_wrench
 from dynakin.filter.skin import following_skin, may_follow, skin_found
@@ -329,8 +330,10 @@ class Estimator:
             notes += [place] if place else []
         if tracker.systematic is not None:
             notes += tracker.systematic.misfit(arrays["state"][-1])
+        followed = np.isfinite(arrays["state"]).all(axis=1)
+        turned = hips_turned(calibrated, arrays["state"][followed])
         systematic = tracker.systematic and tracker.systematic.with_found(
-            ground.clock_sd_s, ground.in_hands_kg, skin_found(calibrated, arrays)
+            ground.clock_sd_s, ground.in_hands_kg, skin_found(calibrated, arrays), turned
         )
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(

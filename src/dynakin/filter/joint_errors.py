@@ -5,7 +5,7 @@ posture: skin, and centres that roll."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Literal
@@ -35,6 +35,8 @@ Kind = Literal[
 """The centre of a joint with one or two axes (hinge) off where it is on its bones, or with three (ball; the spine's)
 within its parent's sagittal plane and across that; its one axis, two or three turned on both bones; the root's frame
 turned in its bone, about its third axis (tilt) or another."""
+BALLS: tuple[Kind, ...] = ("ball_centre", "ball_across")
+"""Centres of joints with three axes that are not the spine's."""
 OF_ROOT: tuple[Kind, ...] = ("root", "root_tilt")
 """What moves no marker beside its bone."""
 Column = dict[str, float]
@@ -53,7 +55,7 @@ class JointErrors:
         free: (K,) places of the original's free coordinates among the larger model's.
         placed: (E,) places of the errors' coordinates among the same.
         sources: (E, S) how far each of these is moved by a unit of each source of error: m a m, rad a rad.
-        kinds: (S,) what each source is.
+        kinds: (S,) what each source is. joints: (S,) the segment that hangs at its joint.
         first_moments: (3 B,) places in the state of first moments, three a segment. masses: (3 B,) kg, of the segments.
         massive: (B,) their names.
     """
@@ -63,6 +65,7 @@ class JointErrors:
     placed: npt.NDArray[np.intp]
     sources: Array
     kinds: tuple[Kind, ...]
+    joints: tuple[str, ...]
     first_moments: npt.NDArray[np.intp]
     masses: Array
     massive: tuple[str, ...]
@@ -73,7 +76,6 @@ class JointErrors:
         spec: _core.ModelSpec,
         reference: Array,
         held: Collection[str] = (),
-        less_sure: Mapping[str, float] | None = None,
         trunks: Collection[str] = (),
     ) -> JointErrors:
         """Those of a model.
@@ -82,15 +84,14 @@ class JointErrors:
             reference: (C,) posture in which the bones were found: there a misplaced joint displaces no bone but its
                 own.
             held: coordinates that are locked because no marker shows them: a hip stays a joint with three axes.
-            less_sure: segment -> how many times as far off the centre of its joint may be as those of others.
             trunks: as of `trunks_of`.
         """
         spec = bare(copy(spec))
         orientations = _orientations(spec, reference)
         larger, added = _with_errors(spec)
-        found = _sources(spec, orientations, set(held), less_sure or {}, trunks)
+        found = _sources(spec, orientations, set(held), trunks)
         place = {name: k for k, name in enumerate(free_names(larger))}
-        sources = np.array([[column.get(name, 0.0) for _, column in found] for name in added])
+        sources = np.array([[column.get(name, 0.0) for _, _, column in found] for name in added])
         model = _core.Model(larger)
         at = {name: k for k, name in enumerate(model.layout.names)}
         estimated = [segment for segment in larger.segments if any(segment.inertia_estimated)]
@@ -99,11 +100,25 @@ class JointErrors:
             np.array([place[c.name] for c in spec.coordinates if c.name in place], dtype=np.intp),
             np.array([place[name] for name in added], dtype=np.intp),
             sources.reshape(len(added), len(found)),
-            tuple(kind for kind, _ in found),
+            tuple(kind for kind, _, _ in found),
+            tuple(joint for _, joint, _ in found),
             np.array([at[f"inertia/{segment.name}/{name}"] for segment in estimated for name in _FIRST], dtype=np.intp),
             np.repeat([float(segment.inertia[0]) for segment in estimated], len(_FIRST)),
             tuple(segment.name for segment in estimated),
         )
+
+    def hips_open_m(self, calibrated: CalibratedModel) -> Array:
+        """(S,) m, what the priors leave open of the centres of hips along each source; 0 of all others."""
+        found = np.zeros(len(self.kinds))
+        if calibrated.plan is None:
+            return found
+        sd = dict(zip(calibrated.names, calibrated.sd0, strict=True))
+        for name in thighs_of(calibrated):
+            own = [k for k, kind in enumerate(self.kinds) if self.joints[k] == name and kind in BALLS]
+            terms = next(segment.lengths for segment in calibrated.spec.segments if segment.name == name)
+            left = [sd.get(f"length/{term.parameter}", 0.0) * np.asarray(term.direction) for term in terms]
+            found[own] = np.linalg.norm([np.zeros(3), *left], axis=0)[: len(own)]
+        return found
 
     def state(self, q: Array, qd: Array, qdd: Array) -> Array:
         """(n,) of the larger model with its errors at 0.
@@ -179,14 +194,13 @@ def _sources(
     spec: _core.ModelSpec,
     orientations: dict[str, Array],
     held: set[str],
-    less_sure: Mapping[str, float],
     trunks: Collection[str],
-) -> list[tuple[Kind, Column]]:
+) -> list[tuple[Kind, str, Column]]:
     """Unit errors along the ground's axes in the reference posture, of balls' centres along their parent's, of the
-    root's frame about its own, by the errors' coordinates that they move."""
+    root's frame about its own: kind, segment of the joint, and how they move the errors' coordinates."""
     planar = not all(spec.markers[0].measured)
     joints = _turning(spec)
-    found: list[tuple[Kind, Column]] = []
+    found: list[tuple[Kind, str, Column]] = []
     for segment in spec.segments:
         if segment.name not in joints:
             continue
@@ -196,7 +210,8 @@ def _sources(
             if not planar and floats(segment):
                 jointed = [c for c in children if c.name in joints]
                 kinds: tuple[Kind, ...] = ("root", "root", "root_tilt")
-                found += [(kind, _root_turned(name, R_B, jointed, e)) for kind, e in zip(kinds, R_B.T, strict=True)]
+                turned = [_root_turned(name, R_B, jointed, e) for e in R_B.T]
+                found += [(kind, name, column) for kind, column in zip(kinds, turned, strict=True)]
             continue
         R_J = orientations[segment.parent] @ segment.rotation
         own = {axis.coordinate for axis in segment.axes if axis.kind == "rotation"}
@@ -206,12 +221,10 @@ def _sources(
             column = _along(name, "moved", R_J, e)
             for child in children:
                 column |= _along(child.name, "moved", R_B @ child.rotation, -e)
-            times = less_sure.get(name, 1.0)
-            found.append(
-                (_centre(axes, k, name in trunks), {coordinate: times * v for coordinate, v in column.items()})
-            )
+            found.append((_centre(axes, k, name in trunks), name, column))
         if not planar:
-            found += [(_TURNED[axes], _along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e)) for e in _AXES]
+            both = [_along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e) for e in _AXES]
+            found += [(_TURNED[axes], name, column) for column in both]
     return found
 
 
@@ -245,14 +258,27 @@ def followed(q: Array, calibrated: CalibratedModel) -> Array:
 
 def trunks_of(calibrated: CalibratedModel) -> set[str]:
     """Segments that hang on one that floats, and that no foot hangs on."""
-    parents = {segment.name: segment.parent for segment in calibrated.spec.segments}
-    with_feet = set()
-    for foot in calibrated.feet.values():
-        while foot in parents:
-            with_feet.add(foot)
-            foot = parents[foot]
+    return _on_root(calibrated) - {*calibrated.tree.up(*calibrated.feet.values())}
+
+
+def thighs_of(calibrated: CalibratedModel) -> set[str]:
+    """Segments that hang on one that floats, and that a foot hangs on."""
+    return _on_root(calibrated) & {*calibrated.tree.up(*calibrated.feet.values())}
+
+
+def _on_root(calibrated: CalibratedModel) -> set[str]:
     roots = {segment.name for segment in calibrated.spec.segments if floats(segment)}
-    return {name for name, parent in parents.items() if parent in roots and name not in with_feet}
+    return {segment.name for segment in calibrated.spec.segments if segment.parent in roots}
+
+
+def hips_turned(calibrated: CalibratedModel, q: Array) -> float:
+    """rad, how far hips turn about their means in free coordinates (T, K): root mean square of the legs, of all axes
+    together; infinite where there are no hips or no frames."""
+    spec, thighs = calibrated.spec, thighs_of(calibrated)
+    place = {name: k for k, name in enumerate(free_names(spec))}
+    axes = [axis for segment in spec.segments if segment.name in thighs for axis in segment.axes]
+    own = sorted({place[axis.coordinate] for axis in axes if axis.kind == "rotation" and axis.coordinate in place})
+    return float(np.sqrt(q[:, own].var(axis=0).sum() / len(thighs))) if own and len(q) else np.inf
 
 
 def neutral(calibrated: CalibratedModel) -> Array:
@@ -266,10 +292,9 @@ def neutral(calibrated: CalibratedModel) -> Array:
     q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
     axes = [axis for segment in spec.segments if floats(segment) for axis in segment.axes]
     turns = {axis.coordinate for axis in axes if axis.kind == "rotation" and axis.direction[1]}
-    on = trunks_of(calibrated)
-    for segment in spec.segments:  # children stand after their parents
-        if segment.parent in on:
-            on.add(segment.name)
+    above = calibrated.tree.below(*trunks_of(calibrated))
+    for segment in spec.segments:
+        if segment.name in above:
             turns |= {axis.coordinate for axis in segment.axes}
     for k, place in enumerate(free):
         if spec.coordinates[place].name in turns:

@@ -18,7 +18,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates, late_by, rates, wrenches_of
-from dynakin.filter.error_sizes import KINDS, OF_JOINTS, Sizes, less_sure_joints, usual_sizes
+from dynakin.filter.error_sizes import CENTRES, KINDS, OF_JOINTS, Sizes, hips_unshown, less_sure_joints, usual_sizes
 from dynakin.filter.in_hands import Hands
 from dynakin.filter.joint_errors import OF_ROOT, JointErrors, drives, floats, neutral, rolls, trunks_of
 from dynakin.filter.limbs import unseen_limbs, unsure_moments
@@ -71,8 +71,7 @@ class Systematic:
         self._locked = [c.name for c in spec.coordinates if c.locked and c.name not in calibrated.held]
         self._feet = len(calibrated.feet)
         reference = neutral(calibrated)
-        unsure, trunks = less_sure_joints(calibrated), trunks_of(calibrated)
-        self._errors = JointErrors.of(spec, reference, calibrated.held, unsure, trunks)
+        self._errors = JointErrors.of(spec, reference, calibrated.held, trunks_of(calibrated))
         self._limbs = unsure_moments(unseen_limbs(calibrated), self._errors.massive)
         self._reference = reference[self._free]
         first = {name: k for k, name in enumerate(calibrated.names)}
@@ -102,17 +101,26 @@ class Systematic:
         self._B0 = gain @ np.hstack([N, self._rolled(self._reference)])
         kinds = np.array([*self._errors.kinds, *("roll" for _ in self._rolls)])
         self._columns = {kind: np.flatnonzero(kinds == kind) for kind in (*OF_JOINTS, "roll")}
+        unsure, of_rolls = less_sure_joints(calibrated), len(self._rolls)
+        sources = zip(self._errors.kinds, self._errors.joints, strict=True)
+        times = [unsure.get(joint, 1.0) if kind in CENTRES else 1.0 for kind, joint in sources]
+        self._times = np.append(times, np.ones(of_rolls))
+        self._hips_open_m = noise.systematic_scale * np.append(self._errors.hips_open_m(calibrated), np.zeros(of_rolls))
         self._segments = {name: k for k, name in enumerate(segments)}
         self._variance_scale = noise.variance_scale
         self._inertia = [
             k for k, name in enumerate(calibrated.names) if self.sizes.inertia and name.startswith("inertia/")
         ]
 
-    def with_found(self, clock_sd_s: float, in_hands_kg: float = 0.0, skin: float = 0.0) -> Systematic:
+    def with_found(
+        self, clock_sd_s: float, in_hands_kg: float = 0.0, skin: float = 0.0, hips_turned: float = np.inf
+    ) -> Systematic:
         """The same, where the plates' clock is less sure than in a walk whose segments are all marked, hands may hold
-        what the model does not have, or more of skin's displacement was found than usual."""
+        what the model does not have, more of skin's displacement was found than usual, or hips turn (rad) so little
+        that their centres stay where standing markers have them."""
         sizes, other = self.sizes, copy(self)
-        other.sizes = replace(sizes, clock=max(clock_sd_s, sizes.clock), hands=in_hands_kg).with_skin(skin)
+        clock, hips = max(clock_sd_s, sizes.clock), hips_unshown(hips_turned)
+        other.sizes = replace(sizes, clock=clock, hands=in_hands_kg, hips=hips).with_skin(skin)
         return other
 
     def _displacements(self, jacobian: Array) -> Array:
@@ -159,7 +167,8 @@ class Systematic:
         # of angles what changes with the posture: a zero is a definition
         squares = [np.square(values) for values in (B - self._B0, Bd, Bdd, moved)]
         for kind, chosen in self._columns.items():
-            found[kind] = self._labelled(*(values[:, chosen].sum(axis=1) for values in squares))
+            found[kind] = self._labelled(*(values[:, chosen] @ self._times[chosen] ** 2 for values in squares))
+        found["hips"] = self._labelled(*(values @ self._hips_open_m**2 for values in squares))
         found["skin"] = self._labelled(*self._skin(q, qd, qdd, (G, Gd, Gdd), (Tq, Tv, Ta)))
         still = np.zeros_like(q)
         by_moment = T[:, errors.first_moments]
