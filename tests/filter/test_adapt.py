@@ -87,7 +87,7 @@ def test_it_holds_on_frames_that_it_has_not_seen(walk: Prepared) -> None:
     before, after = nis_per_row(declared, ~seen), nis_per_row(arrays, ~seen)
     assert before is not None and after is not None
     assert before < 0.5 and 0.7 < after < 1.3
-    assert set(noise.jerk_scale) == {"pelvis", "upper_body", "hips", "knees", "feet"}
+    assert set(noise.jerk_scale) == {"pelvis", "trunk_rotation", "upper_body", "hips", "knees", "feet"}
 
 
 def test_without_plates_the_scale_leaves_priors_their_weight_beside_the_markers(walk: Prepared) -> None:
@@ -134,6 +134,7 @@ def test_joints_are_grouped_by_where_they_are(walk: Prepared) -> None:
     groups = joint_groups(walk.calibrated)
     expected = {
         "pelvis_tx": "pelvis", "pelvis_list": "pelvis", "lumbar_bending": "upper_body", "elbow_flex_l": "upper_body",
+        "lumbar_rotation": "trunk_rotation",
         "hip_rotation_r": "hips", "knee_angle_l": "knees", "ankle_angle_r": "feet", "subtalar_angle_l": "feet",
     }  # fmt: skip
     assert {name: groups[name] for name in expected} == expected

@@ -115,9 +115,14 @@ def prior_factor(noise: Noise) -> float:
     return max(1.0, float(noise.variance_scale**-0.5))
 
 
+_ALONG = 0.7
+"""Of a direction of length 1: more along Y than across it. Segments have their lengths along Y, as OpenSim's."""
+
+
 def joint_groups(initial: CalibratedModel) -> dict[str, JointGroup]:
     """Coordinate -> its group, by its place between the root and the feet; empty of a model that is fixed in the
-    ground."""
+    ground. A trunk has little inertia about its length and turns about it twice a step, arms and all: it has a group of
+    its own."""
     tree = initial.tree
     joints: dict[str, JointGroup] = dict.fromkeys(tree.roots, "pelvis")
     turning = {segment.name for segment in initial.spec.segments if segment.axes}
@@ -129,6 +134,8 @@ def joint_groups(initial: CalibratedModel) -> dict[str, JointGroup]:
     for segment in initial.spec.segments if initial.feet else ():
         above = joints[tree.nearest(segment.name, joints)]  # toes, patella: the group of what they hang on
         group = joints.get(segment.name) or ("upper_body" if above == "pelvis" else above)
+        is_trunk = group == "upper_body" and segment.parent in tree.roots
         for axis in segment.axes:
-            found.setdefault(axis.coordinate, group)
+            about_length = is_trunk and axis.kind == "rotation" and abs(axis.direction[1]) > _ALONG
+            found.setdefault(axis.coordinate, "trunk_rotation" if about_length else group)
     return found

@@ -12,7 +12,7 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=True)]  # infinite: as if there were no such measurement
 Seconds = Annotated[float, Field(gt=0.0)]
 Probability = Annotated[float, Field(ge=0.0, lt=1.0)]
-JointGroup = Literal["pelvis", "upper_body", "hips", "knees", "feet"]
+JointGroup = Literal["pelvis", "trunk_rotation", "upper_body", "hips", "knees", "feet"]
 """Joints that move alike; ``pelvis``: the six coordinates of a floating model's root."""
 
 
@@ -175,8 +175,8 @@ class Noise(Called, use_attribute_docstrings=True):
     before: what changes is how sure of it the filter is, and how much it weighs against the plates. A factor below 1
     refuses no more markers: that, and when a coordinate counts as unseen, goes by the variances without it."""
     jerk_scale: dict[JointGroup, Positive] = Field(default_factory=dict)
-    """Factor on the jerk's density of a group of joints, of a model that is fixed nowhere: pelvis, upper_body, hips,
-    knees, feet; 1 where not given."""
+    """Factor on the jerk's density of a group of joints, of a model that is fixed nowhere: pelvis, trunk_rotation
+    (about its length), upper_body, hips, knees, feet; 1 where not given."""
 
     constraint: Literal["projection", "gain", "sigmoid", "none"] = "projection"
     """How bounds are kept: by projection in the metric of P^-1, by restricting the gain (7), by a smooth map, or not
