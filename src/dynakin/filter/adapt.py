@@ -46,8 +46,8 @@ it is, not how large the noise is."""
 JERK_SHARE: dict[JointGroup, float] = {"feet": 1.0, "trunk_rotation": 1.0}
 OTHER_JERK_SHARE = 0.5
 """Part of a jerk scale's logarithm that is believed: jerk is not white, and what fits the next frame best is too little
-for a step. Of feet all of it: what is kept back there turns up as ankles that are off by a constant (`truth3d`); and of what
-turns the trunk about its length, which was cut at 5 to 8 Hz (walks of `truth3d` 3, 31 and of two other persons)."""
+for a step. Of feet all of it: what is kept back there turns up as ankles that are off by a constant (`truth3d`); and of
+what turns the trunk about its length, which was cut at 5 to 8 Hz (`truth3d`'s walks 3, 31, two of other persons)."""
 LATE_SHARE = 0.8
 """Part of the factor's logarithm that is believed of estimates without any lag: they are late where accelerations
 change, which the next frame hardly shows."""
