@@ -15,6 +15,7 @@ from dynakin.report.insights import insights
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.soft_tissue import marker_sites
+from dynakin.results.records import Event
 
 
 def found(estimate: Estimate) -> dict[str, Insight]:
@@ -61,6 +62,15 @@ def test_bounds_are_counted_by_kind_and_those_touched_for_a_time_are_told(estima
     finding = found(with_element(estimate, "length/shank", path))["Bounds"].text
     assert "(1 of 6 lengths, 0 of 20 marker places, 1 of 21 inertial numbers)" in finding
     assert "1 other touched a bound and left it (longest: shank length, 50 % of the time)" in finding
+
+
+def test_a_joint_at_the_end_of_a_files_range_may_go_farther_than_the_file(estimate: Estimate) -> None:
+    held = Event(2.0, 20, "at_bound", str(estimate.coordinate_names[0]), "held at its joint limit for 9 frames")
+    stuck = replace(estimate, events=[*estimate.events, held])
+    advice = found(stuck)["Joint limits"].advice
+    assert "a marker is swapped" in advice and "widen" not in advice
+    scaled = replace(stuck, config=estimate.config | {"model": "models/scaled.osim"})
+    assert found(scaled)["Joint limits"].advice == advice + " Where it does, widen its range in scaled.osim."
 
 
 def test_a_bound_that_lies_nearer_than_a_number_is_known_says_nothing(estimate: Estimate) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from dynakin.report.findings.finding import Insight, Metrics
 from dynakin.report.labels import parameter_label, short_marker_names
 from dynakin.results.estimate import Estimate
@@ -166,4 +168,6 @@ def joint_limits(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if not stuck:
         return None
     text = f"Held at its limit for part of the time: {listed(stuck)}."
-    return Insight("warning", "Joint limits", text, ADVICE["limits"])
+    file = Path(str(estimate.config.get("model", "")))
+    own_range = f" Where it does, widen its range in {file.name}." if file.suffix else ""
+    return Insight("warning", "Joint limits", text, ADVICE["limits"] + own_range)
