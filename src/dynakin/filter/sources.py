@@ -145,6 +145,7 @@ class ContactSources:
         self._moved = [self._segments.index(name) for name in moved_segments(spec)]
         self._soles = tuple(soles)
         at = [self._segments.index(name) for name in soles]
+        self._feet = at
         self._legs, self._over_the_legs = _below_the_thighs(at, self._parents), _over_the_legs(at, self._parents)
 
     @classmethod
@@ -157,14 +158,16 @@ class ContactSources:
         return _gone(hidden, self._segments, self._parents, frames)[:, self._moved]
 
     def moments(self, feet: ContactLoads | None, *, refused: bool = False, carried: bool = False) -> Codes:
-        """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody
-        knows.
+        """(T, C) codes of the moments by the contacts. Without them one row: of a model that stands on its root
+        measured, as far as anybody knows; of one on feet legs and root are absent, since nobody knows what bears them.
 
         Args:
             refused: what the plates say was. carried: as of `with_sources`.
         """
         if feet is None:
-            return np.where(self._held, ABSENT, MEASURED).astype(np.uint8)[None]
+            unknown = _behind(np.full((1, len(self._feet)), ABSENT), self._feet, self._parents)
+            unknown[:, self._legs] = ABSENT  # toes, too
+            return np.where(self._held, ABSENT, unknown[:, self._moved]).astype(np.uint8)
         undeclared = feet.undeclared
         at = [self._segments.index(name) for name in feet.segments]
         contacts = _contacts(feet, undeclared, self._unmarked, np.full(len(undeclared), refused))

@@ -18,7 +18,6 @@ from dynakin.messages import Message, warning
 from dynakin.recordings.recording import Recording
 from dynakin.settings.defaults import DELAY_S
 from dynakin.settings.lag import live_lag
-from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.markers import LiveMarkers
 from dynakin.stream.monitor import Monitor
@@ -36,7 +35,6 @@ _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is
 _DEVIATIONS_S, _DELAYED_DEVIATIONS_S = 0.2, 1.0  # those of a lag take 0.6 steps for each of its frames
 _SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
 _CATCH_UP_S = 1.0  # with what came while the model was measured: that is left out too, but is no sign of slowness
-_MISSING = np.full(3, np.nan)
 _MASS_KG = 70.0  # of a person of whom nothing is known, so that at least the movement is seen
 
 
@@ -91,8 +89,6 @@ class Live:
         self._tracker: Tracker | None = None
         self._monitor: Monitor | None = None
         self._plates: LivePlates | None = None
-        self._feet: LiveFeet | None = None
-        self._own = np.zeros(0, dtype=int)  # places of the model's markers among the stream's, after the last: missing
         self._running = False
         self._labels_checked = False
         self._subject: dict[str, float] = {}
@@ -321,11 +317,6 @@ class Live:
         if self._monitor is not None:
             monitor.go_on_from(self._monitor)
         self._monitor = monitor
-        self._feet = None
-        streamed = {name: k for k, name in enumerate(self.fusion.markers.names)}
-        self._own = np.array([streamed.get(name, len(streamed)) for name in initial.recorded_markers])
-        if initial.feet:  # without plates too: what depends on the ground is then a prior
-            self._feet = LiveFeet(initial, self.estimator.noise, self.plates.names, self.estimator.plates)
         self._running = True
         self._ready_s = time.monotonic()
         self._window.clear()
@@ -337,22 +328,16 @@ class Live:
         monitor, tracker, plates = self._monitor, self.tracker, self.plates
         assert monitor is not None
         plates.checked(fused)
-        sample, feet, whole = fused.sample, None, True
-        if self._feet is not None:
-            wrenches = fused.wrenches if plates.used else None
-            markers = tracker.calibrated.ground.points_to_ground(np.vstack([fused.positions, _MISSING])[self._own])
-            markers[np.array(tracker.verdicts[: len(markers)]) == "refused"] = np.nan
-            feet, whole = self._feet.look(tracker.core_model, tracker.state, sample.time_s, wrenches, markers)
-            if wrenches is not None:
-                plates.moved(sample.time_s, markers, wrenches, self._feet.claimed, whole)
-        if not (whole and plates.used):
-            sample = Sample(sample.time_s, sample.markers)
+        sample = fused.sample if plates.used else Sample(fused.sample.time_s, fused.sample.markers)
         try:
-            estimate = tracker.step(sample, feet)
+            estimate = tracker.step(sample)
         except DivergenceError as error:
             self.say(f"{error.message}; the estimate starts again.")
             self.restart()
             return
+        feet, whole = tracker.feet, tracker.feet is None or tracker.feet.whole
+        if feet is not None and feet.seen is not None and plates.used and fused.wrenches is not None:
+            plates.moved(sample.time_s, feet.seen, fused.wrenches, feet.claimed, whole)
         smoothed = tracker.delayed() if tracker.lag else None
         state = tracker.state
         deviations = None
@@ -366,7 +351,7 @@ class Live:
         frame = LiveFrame(estimate, smoothed, published, fused, state, deviations, status)
         self.sinks.frame(frame)
         monitor.published(sample.time_s, time.monotonic() - fused.arrived_s)
-        news = self._feet.news() if self._feet is not None else []
+        news = [] if feet is None else feet.news()
         motion = monitor.motion(estimate, fused)
         for text in [*news, *motion, *monitor.settling(sample.time_s, state, tracker)]:
             self.say(text)
