@@ -124,6 +124,10 @@ def test_pelvis_and_one_leg_are_followed_live(
     counted = next(text for text in said if "are there" in text)
     count, of = (int(word) for word in counted.split() if word.isdigit())
     assert 2 * count < of and "Ready: move." in said
+    texts = [message.text for message in live.tracker.calibrated.messages]
+    assert any(
+        text.startswith(f"Marker set {counted.split(' markers')[0]} markers by name") for text in texts
+    )  # as run
 
     def knee(frames: list[LiveFrame], live: Live) -> np.ndarray:
         assert live.tracker.calibrated is not None

@@ -281,6 +281,7 @@ class Live:
         since = t - self.standing_s - 0.5 / info.rate_hz
         recent = [one for one in self._window if one.sample.time_s >= since]
         recording, static = recording_of(recent, info.names, plates, subject=self._subject), self.static
+        moving: list[Fused] = []
         waited = t - self._standing_since > self.standing_wait_s
         if not stands(recording):
             if not waited:
@@ -288,6 +289,7 @@ class Live:
             whole = recording_of(list(self._window), info.names, plates, subject=self._subject)
             recording, quiet, text = quietest(whole, weigh=not self.estimator.model.has_mass)
             static = static or quiet
+            moving = [one for one in self._window if one.sample.time_s >= recording.time[0]]
             self.say(f"Nobody stood still for {self.standing_s:g} s.")
             self.say(text if self.static is None else "Lengths and marker places are those of the standing trial.")
         try:
@@ -308,7 +310,21 @@ class Live:
         for message in said:
             self.say(message)
         self.plates.measured(said, usable)
+        self._come_up(moving)
         self._begin_running("Ready: move.")
+
+    def _come_up(self, frames: Sequence[Fused]) -> None:
+        """Step through the frames on which somebody was measured who moves: the start is the first of them, and what it
+        is off by when the session goes on would be taken for other marker places."""
+        for fused in frames:
+            try:
+                self.tracker.step(self._sample(fused))
+            except DivergenceError:
+                self._tracker = self.tracker.fresh()
+                return
+
+    def _sample(self, fused: Fused) -> Sample:
+        return fused.sample if self.plates.used else Sample(fused.sample.time_s, fused.sample.markers)
 
     def _begin_running(self, text: str) -> None:
         initial = self.tracker.calibrated
@@ -328,7 +344,7 @@ class Live:
         monitor, tracker, plates = self._monitor, self.tracker, self.plates
         assert monitor is not None
         plates.checked(fused)
-        sample = fused.sample if plates.used else Sample(fused.sample.time_s, fused.sample.markers)
+        sample = self._sample(fused)
         try:
             estimate = tracker.step(sample)
         except DivergenceError as error:

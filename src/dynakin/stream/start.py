@@ -29,7 +29,7 @@ from dynakin.recordings.vertical import find_vertical
 from dynakin.results.naming import listed
 from dynakin.stream.fusion import Fused
 
-_NOW_S = 0.1  # the present posture, from a few frames
+_NOW_S = 0.5  # the present movement; in half of a walk's cycle each leg is once near to how it stands
 _KINDS = ("length", "marker", "inertia")
 
 
@@ -45,7 +45,7 @@ def check_labels(model: Definition, recording: Recording) -> str:
             f"the stream's markers do not fit the model: {len(found)} of {len(expected)} found, {lacks}; "
             f"came: {', '.join(recording.marker_names)}; expected those of {name}: {', '.join(expected)}"
         )
-    return f"{len(found)} of the {len(expected)} markers of {name} are there."
+    return f"{name}: {len(found)} of its {len(expected)} markers are there."
 
 
 def recording_of(
