@@ -31,14 +31,16 @@ def written(folder: Path) -> Path:
     return path
 
 
-def test_live_estimates_records_and_finishes(tmp_path: Path, capsys: Said) -> None:
+def test_live_estimates_records_and_finishes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Said) -> None:
     source = "simulate:squat,model=sagittal7,duration=5,speed=0"
     static = written(tmp_path)
-    options = [*PERSON, "--static", os.path.relpath(static)]
+    monkeypatch.chdir(tmp_path)
+    options = [*PERSON, "--static", static.name]
     assert main(["live", "--source", source, *options, "--record", str(tmp_path / "r")]) == 0
     said = capsys.readouterr().out
     assert "Stand still" in said and "Ready: move." in said and "--finish" in said
     assert (tmp_path / "r" / "stream.dkr").stat().st_size > 100_000
+    monkeypatch.chdir(Path(__file__).parent)
     assert main(["live", "--finish", str(tmp_path / "r"), "-o", str(tmp_path / "o")]) == 0
     assert (tmp_path / "o" / "report.html").exists()
     assert tomllib.loads((tmp_path / "o" / "config.toml").read_text())["static"] == str(static)
