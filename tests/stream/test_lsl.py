@@ -164,7 +164,12 @@ def test_live_equals_offline_on_the_same_samples(data_dir: Path, monkeypatch: py
     begin_when_open(live, laboratory, wait)
     stepped: list[Fused] = []
     sampled = live._sample
-    monkeypatch.setattr(live, "_sample", lambda fused: (stepped.append(fused), sampled(fused))[1])
+
+    def sample(fused: Fused) -> dynakin.Sample:
+        stepped.append(fused)
+        return sampled(fused)
+
+    monkeypatch.setattr(live, "_sample", sample)
     live.run()
     # What arrived is what was sent.
     markers = [packet for packet in kept.packets if isinstance(packet, MarkerPacket)]

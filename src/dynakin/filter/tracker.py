@@ -34,8 +34,6 @@ from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
 
-_UNKNOWN = np.full(6, np.nan)  # a plate that a sample lacks
-
 
 class _Stepped(NamedTuple):
     """Of a step: its feet, whose moments are measured, their segments, whether plates miss one of them, or all; (6,)
@@ -214,7 +212,8 @@ class Tracker:
         elif self.feet.plates != names:
             self.feet.meet(names)
         seen = np.where(np.array(self.verdicts[:-1])[:, None] == "refused", np.nan, markers)
-        plates = np.array([sample.plates.get(name, _UNKNOWN) for name in names], dtype=float) if sample.plates else None
+        unknown = np.full(6, np.nan)  # of a plate that the sample lacks
+        plates = np.array([sample.plates.get(name, unknown) for name in names], dtype=float) if sample.plates else None
         return self.feet.look(self.core_model, self.state, sample.time_s, plates, seen)
 
     def _estimate(self, step: _Stepped, time_s: float, x: Array, report: _core.StepReport | None) -> StepEstimate:
