@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import runpy
 import subprocess
 import sys
 import tomllib
@@ -50,6 +51,13 @@ def test_installed_command_gives_its_exit_code(tmp_path: Path) -> None:
     )
     assert done.returncode == 2
     assert done.stderr.startswith("error: ") and "no.c3d" in done.stderr
+
+
+def test_the_package_is_the_command(monkeypatch: pytest.MonkeyPatch, capsys: Said) -> None:
+    monkeypatch.setattr(sys, "argv", ["dynakin", "--version"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("dynakin", run_name="__main__")
+    assert ended.value.code == 0 and dynakin.__version__ in capsys.readouterr().out
 
 
 def test_model_lists_and_describes(capsys: Said) -> None:

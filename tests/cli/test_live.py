@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -30,14 +31,24 @@ def written(folder: Path) -> Path:
     return path
 
 
-def test_live_estimates_records_and_finishes(tmp_path: Path, capsys: Said) -> None:
+def test_live_estimates_records_and_finishes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Said) -> None:
     source = "simulate:squat,model=sagittal7,duration=5,speed=0"
-    assert main(["live", "--source", source, *PERSON, "--record", str(tmp_path / "r")]) == 0
+    static = written(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    options = [*PERSON, "--static", static.name]
+    assert main(["live", "--source", source, *options, "--record", str(tmp_path / "r")]) == 0
     said = capsys.readouterr().out
     assert "Stand still" in said and "Ready: move." in said and "--finish" in said
     assert (tmp_path / "r" / "stream.dkr").stat().st_size > 100_000
+    monkeypatch.chdir(Path(__file__).parent)
     assert main(["live", "--finish", str(tmp_path / "r"), "-o", str(tmp_path / "o")]) == 0
     assert (tmp_path / "o" / "report.html").exists()
+    assert tomllib.loads((tmp_path / "o" / "config.toml").read_text())["static"] == str(static)
+    static.unlink()
+    assert main(["live", "--finish", str(tmp_path / "r"), "-o", str(tmp_path / "other")]) == 2
+    said = capsys.readouterr().err
+    assert f"the session's static, {static}, is there no more, expected it, or --static FILE" in said
+    assert said.count("\n") == 1 and not (tmp_path / "other").exists()
     known = str(tmp_path / "o" / "parameters.json")
     assert main(["live", "--source", source, *PERSON, "--parameters", known, "--lag", "0.1"]) == 0
     said = capsys.readouterr().out

@@ -45,6 +45,35 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
         live.step(sample, replace(part, segments=("paw", "foot_l")))
 
 
+def test_a_loop_gives_its_plates_to_the_feet_that_stand_on_them() -> None:
+    """As a run does, without being told of feet; names of plates that the start did not have come with the samples."""
+    recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.4)
+    model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
+    live = Estimator(model).start(recording)
+    legs = [k for k, c in enumerate(live.calibrated.spec.coordinates) if c.name.startswith(("hip", "knee", "ankle"))]
+    before = live.latest
+    assert (before.moment_sources.values[legs] == ABSENT).all() and np.isnan(before.moments.values[legs]).all()
+    assert before.moment_sources["elbow_flex_r"] == MEASURED
+    told, unknown = live.fresh(), Estimator(model).start(live.calibrated)
+    samples = _samples(recording)
+    for sample, part in zip(samples, _frames(_feet(recording, live)), strict=True):
+        now, there, found = live.step(sample), told.step(sample, part), unknown.step(sample)
+        np.testing.assert_array_equal(found.moments, now.moments)
+        np.testing.assert_allclose(now.moments.values[legs], there.moments.values[legs], atol=1.0)
+        np.testing.assert_allclose(now.wrench, there.wrench, atol=1.0)
+        assert (now.moment_sources.values[legs] == MEASURED).all()
+    assert np.abs(now.moments.values[legs]).max() > 30.0
+    np.testing.assert_allclose(
+        live.deviations()["moments"].values[legs], told.deviations()["moments"].values[legs], 0.2
+    )
+    assert live.feet is not None and live.feet.whole and not live.feet.news()
+    late = dict(samples[-1].plates)
+    last = replace(samples[-1], time_s=samples[-1].time_s + 0.01)
+    late.pop(next(iter(late)))
+    assert (live.step(replace(last, plates=late)).moment_sources.values[legs] > MEASURED).any() and live.feet.news()
+    assert (unknown.step(replace(last, plates={})).moment_sources.values[legs] > MEASURED).any()
+
+
 def test_a_session_counts_measured_moments_more_once_a_foot_has_stood_off_the_plates() -> None:
     """As a recording does: late ones, in all frames from then on."""
     recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.2)

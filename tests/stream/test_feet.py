@@ -12,6 +12,7 @@ import dynakin
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.live.feet import LiveFeet
 from dynakin.filter.reported_sd import OWN_AT_ONCE
 from dynakin.model.markers.recognise import recognise
 from dynakin.recordings.feet.assignment import foot_loads
@@ -21,7 +22,6 @@ from dynakin.recordings.recording import Plate, Recording
 from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
-from dynakin.stream.feet import LiveFeet
 from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame
 from dynakin.stream.sources.replay import Replay
@@ -124,6 +124,10 @@ def test_pelvis_and_one_leg_are_followed_live(
     counted = next(text for text in said if "are there" in text)
     count, of = (int(word) for word in counted.split() if word.isdigit())
     assert 2 * count < of and "Ready: move." in said
+    texts = [message.text for message in live.tracker.calibrated.messages]
+    assert any(
+        text.startswith(f"Marker set {counted.split(' markers')[0]} markers by name") for text in texts
+    )  # as run
 
     def knee(frames: list[LiveFrame], live: Live) -> np.ndarray:
         assert live.tracker.calibrated is not None
@@ -231,7 +235,8 @@ class Standing:
         wrench = np.concatenate([force, np.cross(point * [1.0, 0.0, 1.0], force)])
         to_ground = ground.wrench_to_ground(np.eye(6)).T
         self.frame += 1
-        return self.feet.look(self.model, self.state, self.frame / 100.0, np.linalg.solve(to_ground, wrench)[None])
+        found = self.feet.look(self.model, self.state, self.frame / 100.0, np.linalg.solve(to_ground, wrench)[None])
+        return found, self.feet.whole
 
 
 def test_two_feet_on_one_plate_share_it_by_their_priors_and_it_is_said_once(trial: SimulatedTrial) -> None:

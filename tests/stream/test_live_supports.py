@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dynakin.filter.live.feet import LiveFeet
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
 from dynakin.recordings.standing import marker_velocities
 from dynakin.settings import presets
-from dynakin.stream.feet import LiveFeet
 from dynakin.tree import Tree
 from support.made_steps import (
     FOOT_MARKERS,

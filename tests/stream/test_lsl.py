@@ -18,6 +18,7 @@ from dynakin.recordings.plates.pressure import UNLOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import CausalLowPass, latest_before
 from dynakin.simulation.trial import simulate_squat
+from dynakin.stream.fusion import Fused
 from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket
@@ -136,7 +137,7 @@ def test_markers_and_plates_come_in_and_estimates_go_out() -> None:
     assert np.nanmin(np.abs(recording.markers - first.positions).max(axis=(1, 2))) < 1e-9
 
 
-def test_live_equals_offline_on_the_same_samples(data_dir: Path) -> None:
+def test_live_equals_offline_on_the_same_samples(data_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     trial = data_dir / "opencap_subject4"
     recording = dynakin.read(trial / "squats1.trc", trial / "squats1_grf.mot").window(0.0, 6.5)
     name = f"test{uuid.uuid4().hex[:8]}"
@@ -161,6 +162,14 @@ def test_live_equals_offline_on_the_same_samples(data_dir: Path) -> None:
         time.sleep(0.5)
 
     begin_when_open(live, laboratory, wait)
+    stepped: list[Fused] = []
+    sampled = live._sample
+
+    def sample(fused: Fused) -> dynakin.Sample:
+        stepped.append(fused)
+        return sampled(fused)
+
+    monkeypatch.setattr(live, "_sample", sample)
     live.run()
     # What arrived is what was sent.
     markers = [packet for packet in kept.packets if isinstance(packet, MarkerPacket)]
@@ -186,9 +195,16 @@ def test_live_equals_offline_on_the_same_samples(data_dir: Path) -> None:
             wrench[k] = filtered[row - back].sum(axis=0)
             earlier += back
     assert len(frames) > 400 and np.isnan(wrench).mean() < 0.2 and earlier < 0.2 * len(frames)
-    own = np.stack([one.positions for one in markers])[len(markers) - len(frames) :]
+    # Nobody stands here: the frames of which the model was measured came first.
+    before = stepped[: -len(frames)]
+    assert len(before) in (50, 51) and before[-1].sample.time_s < times[0]
+    own = np.stack([one.positions for one in markers])[len(markers) - len(stepped) :]
+    np.testing.assert_array_equal(np.stack([one.positions for one in stepped]), own)
+    assert all(one.wrenches is not None for one in before)
+    wrench = np.concatenate([[one.wrenches.sum(axis=0) for one in before if one.wrenches is not None], wrench])
+    times = np.concatenate([[one.sample.time_s for one in before], times])
     states = offline_states(live, times, recording.marker_names, own, wrench)
-    np.testing.assert_allclose(np.stack([f.state for f in frames]), states, atol=1e-9)
+    np.testing.assert_allclose(np.stack([f.state for f in frames]), states[len(before) :], atol=1e-9)
 
 
 def test_a_stream_that_is_not_there_is_named() -> None:

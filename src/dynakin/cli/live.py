@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 # Seconds of standing that are asked for, and how long they are waited for.
 _LIVE_STANDING_S, _REPLAY_STANDING_S = (2.0, 20.0), (2.0, 3.0)
+_FILES = frozenset({"static", "parameters"})
 _HOST, _PORT = "127.0.0.1", 8080
 _SHORT_S, _SHORT_STANDING_S = 6.0, 0.4
 
@@ -88,6 +89,13 @@ def live(
     from dynakin.stream.sinks.recorder import Recorder, finish
     from dynakin.stream.sources.replay import Replay
 
+    known = None
+    if parameters is not None and parameters.suffix.casefold() == ".json":
+        known = parameters
+    elif parameters is not None:
+        given["parameters"] = parameters
+    for key in _FILES & given.keys():  # which a recording names, wherever it is finished
+        given[key] = str(Path(given[key]).absolute())
     if finish_folder is not None:
         if output is None:
             raise typer.BadParameter("--finish needs -o OUT, the folder for the results")
@@ -95,7 +103,7 @@ def live(
         named: dict[str, object] = {
             "--source": source,
             "--forces": forces,
-            "--parameters": parameters,
+            "--parameters": known,
             "--record": record,
         }
         named |= {"--standing-wait": standing_wait, "--lag": lag, "--publish": publish}
@@ -118,9 +126,7 @@ def live(
             raise typer.BadParameter(f"{option} is {seconds:g}, expected seconds, 0 or more")
     if not 0 <= port < 65536:
         raise typer.BadParameter(f"--port is {port}, expected 0 (any that is free) to 65535")
-    static = given.pop("static", None)
-    if parameters is not None and parameters.suffix.casefold() == ".toml":
-        given["parameters"], parameters = str(parameters.absolute()), None
+    static = given.get("static")
     settings = {"model": Settings().model} | given  # which is to stand in what is recorded
     sources = _sources(source, forces)
     standing, wait = _LIVE_STANDING_S
@@ -138,7 +144,7 @@ def live(
                 standing_s=standing,
                 standing_wait_s=wait if standing_wait is None else standing_wait,
                 static=None if static is None else read(static),
-                known=None if parameters is None else _estimated(parameters),
+                known=None if known is None else _estimated(known),
                 record=lambda: Recorder(Path(f"live-{datetime.now():%Y%m%d-%H%M%S}"), settings),
                 say=lambda text: out().print(text, soft_wrap=True),
             )
@@ -146,6 +152,8 @@ def live(
         for sink in sinks:
             sink.close()
         raise
+    if record is not None and known is not None:
+        out().print(f"{known} is for the session alone: --finish finds constants anew, as dynakin run.", soft_wrap=True)
     gc.collect()
     gc.freeze()  # what was imported is never garbage; looking through it would cost tens of milliseconds now and then
     try:

@@ -180,7 +180,7 @@ class Estimator:
             raise ConfigError("lag_s: a lag needs the rate of the samples, expected rate_hz")
         calibrated = self.calibrate(source, static=static) if isinstance(source, Recording) else source
         plates = [plate.name for plate in source.plates] if isinstance(source, Recording) else []
-        return Tracker(calibrated, self.noise, self.estimate, lag_frames(lag_s, rate_hz or 0.0), plates)
+        return Tracker(calibrated, self.noise, self.estimate, lag_frames(lag_s, rate_hz or 0.0), plates, self.plates)
 
     def run(
         self,

@@ -113,7 +113,7 @@ class ContactSources:
 
         Args:
             feet: contacts (T, F) and the segments on which they act; None of a model that stands on its root, whose
-                only contact the plates' sum is.
+                only contact the plates' sum is, and where nobody knows what bears one on feet.
             undeclared: (T,) frames in which something bears the person that no plate measures.
             refused: (T,) frames whose plates were refused; without ``feet`` also those without their sum.
             gone: (T, J) joints of which nothing is known, as of `gone`.
@@ -124,6 +124,8 @@ class ContactSources:
             contacts = np.where(refused, DERIVED, MEASURED).astype(np.uint8)[:, None]
             joints = np.tile(contacts, (1, len(self.tree.parents)))
             joints[undeclared] = ABSENT
+            on_feet = _flags(self.tree.up(*self.soles), self.tree) | self._legs
+            joints[:, on_feet] = ABSENT  # nobody knows what bears a model on feet
         else:
             contacts = contact_sources(feet.contact, undeclared)
             contacts[refused[:, None] & (feet.contact == ON_PLATE)] = DERIVED
@@ -140,8 +142,8 @@ class ContactSources:
         return contacts, joints
 
     def moments(self, feet: ContactLoads | None, *, refused: bool = False, carried: bool = False) -> Codes:
-        """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody
-        knows.
+        """(T, C) codes of the moments by the contacts. Without them one row: of a model that stands on its root
+        measured, as far as anybody knows; of one on feet legs and root are absent, since nobody knows what bears them.
 
         Args:
             refused: what the plates say was. carried: as of `joints`.

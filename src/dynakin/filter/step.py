@@ -129,7 +129,7 @@ class StepEstimate:
 
     @property
     def moments(self) -> Labelled:
-        """(C,) N m or N; of a floating model without feet those without ground reaction."""
+        """(C,) N m or N; NaN where nobody knows them (`moment_sources`)."""
         return Labelled(self.values["moments"], self.labels.coordinates)
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -14,6 +14,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.contacts import ContactLoads, stands_off_plates
 from dynakin.filter.core_filter import core_filter, smoothed
+from dynakin.filter.live.feet import LiveFeet
 from dynakin.filter.noise import prior_factor
 from dynakin.filter.reported_sd import BLOCKS, as_believed
 from dynakin.filter.samples import Sample, sample_arrays
@@ -58,8 +59,10 @@ class Tracker:
         noise, estimate: as of `Estimator`.
         lag: frames by which `delayed` lies behind `step`; 0: there is none.
         plates: names of all force plates; not given: those that samples have had so far.
+        assigned: plate -> foot or declared contact, as ``plates`` of `Estimator`.
 
     Attributes:
+        feet: of a floating model, from its first `step` on: which feet its plates carry. Its ``news()`` are sentences.
         calibrated: the same with the states that the noise asks for, as the filter has them.
         core_model: it, compiled.
 
@@ -74,10 +77,12 @@ class Tracker:
         estimate: Collection[Quantity] = QUANTITIES,
         lag: int = 0,
         plates: Collection[str] = (),
+        assigned: Mapping[str, str] | None = None,
     ) -> None:
         self.calibrated, self.core_model, self._filter = core_filter(calibrated, noise, estimate)
         self.noise, self.estimate, self.lag, self.plates = noise, tuple(estimate), lag, tuple(plates)
-        self._seen_plates = dict.fromkeys(plates)
+        self.feet: LiveFeet | None = None
+        self._assigned, self._seen_plates = assigned or {}, dict.fromkeys(plates)
         if lag:
             check_can_smooth(noise)
         self._lag = _core.FixedLag(self._filter, lag) if lag else None
@@ -92,11 +97,11 @@ class Tracker:
 
     def fresh(self) -> Tracker:
         """Another one, at the start of the same model."""
-        return Tracker(self.calibrated, self.noise, self.estimate, self.lag, self.plates)
+        return self.changed(self.noise)
 
     def changed(self, noise: Noise) -> Tracker:
         """Another one, at the start of the same model with other noise, which asks for the same states."""
-        return Tracker(self.calibrated, noise, self.estimate, self.lag, self.plates)
+        return Tracker(self.calibrated, noise, self.estimate, self.lag, self.plates, self._assigned)
 
     @property
     def state(self) -> Array:
@@ -139,15 +144,14 @@ class Tracker:
         """Take one sample; samples come in the order of their times.
 
         The six rows of the wrench are the sum of the sample's plates; where one of them is left out, it is not known.
-        For a model with a floating root give plates only where they carry all that the ground does to the person, as
-        `dynakin.stream.Live` decides in each step.
+        For a model with a floating root the plates are given to the feet that stand on them (`LiveFeet`, by the frames
+        until now), and the feet's wrenches are what moments, deviations and those of `delayed` come from; what no plate
+        carries is estimated, and `moment_sources` says where. Plates are taken as they are: `dynakin.stream.Live` also
+        checks their axes, signs and clock, and what of the samples is no measurement.
 
         Args:
-            feet: for models with a floating root: the feet's wrenches in this frame (T = 1). Moments, deviations and
-                those of `delayed` are then what these leave, as in `Estimator.run`. Without them the moments of a
-                floating model have no ground reaction in them, and are no joint moments of a person on the ground: use
-                `Estimator.run`, or `dynakin.stream.Live`, which finds the feet's wrenches. Their sum
-                is then the total wrench that the filter takes, instead of the sample's plates.
+            feet: the feet's wrenches in this frame (T = 1) where they are known otherwise; the sample's plates are then
+                not asked.
 
         Raises:
             RecordingError: the sample is older than the one before, or holds something else than numbers in the shapes
@@ -164,6 +168,8 @@ class Tracker:
         dt = 0.0 if self._time is None else sample.time_s - self._time
         if dt < 0.0:
             raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
+        if feet is None and self.calibrated.feet:
+            feet = self._on_plates(sample, markers)
         feet = feet and feet.weighed(self.noise.variance_scale)
         loads = self._loads(feet)
         covariance = effects = None
@@ -198,6 +204,18 @@ class Tracker:
         self._latest = self._estimate(step, sample.time_s, self.state, report)
         return self._latest
 
+    def _on_plates(self, sample: Sample, markers: Array) -> ContactLoads:
+        """The feet's wrenches by the sample's plates, and its markers (M, 3) but those that were refused before."""
+        names = tuple(self._seen_plates)
+        if self.feet is None:
+            self.feet = LiveFeet(self.calibrated, self.noise, names, self._assigned)
+        elif self.feet.plates != names:
+            self.feet.meet(names)
+        seen = np.where(np.array(self.verdicts[:-1])[:, None] == "refused", np.nan, markers)
+        unknown = np.full(6, np.nan)  # of a plate that the sample lacks
+        plates = np.array([sample.plates.get(name, unknown) for name in names], dtype=float) if sample.plates else None
+        return self.feet.look(self.core_model, self.state, sample.time_s, plates, seen)
+
     def _estimate(self, step: _Stepped, time_s: float, x: Array, report: _core.StepReport | None) -> StepEstimate:
         by_plates = step.plates_sd is not None
         return step_estimate(
@@ -208,7 +226,7 @@ class Tracker:
         """The frame that lies ``lag`` frames back, smoothed by all samples until now; None before there is one.
 
         Its ``time_s`` is its own: the delay is the last sample's time less that. Moments come from the feet's wrenches
-        that `step` was given for that frame; without them, of a floating model, they have no ground reaction in them.
+        that `step` had for that frame.
 
         Raises:
             ConfigError: the tracker was started without a lag.
@@ -229,8 +247,7 @@ class Tracker:
                 the lag.
 
         Returns:
-            coordinates, speeds, accelerations, moments (C,), of all coordinates of the model; wrench (6,). Moments as
-            `step` gave them: with the feet's wrenches where it had these.
+            coordinates, speeds, accelerations, moments (C,), of all coordinates of the model; wrench (6,).
 
         Raises:
             ConfigError: ``delayed``, and the tracker was started without a lag.

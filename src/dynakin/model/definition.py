@@ -23,7 +23,7 @@ from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import Asked, measure
 from dynakin.model.markers.fit import choose_marker_set, lacking
 from dynakin.model.markers.marker_set import load_marker_set
-from dynakin.model.markers.match import match_markers
+from dynakin.model.markers.match import SIDES, match_markers
 from dynakin.model.markers.recognise import recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.mirroring import SUFFIXES
@@ -149,8 +149,8 @@ class ModelDefinition:
         return replace(self, subject=subject)
 
     def markers_among(self, recording: Recording) -> tuple[str, list[str], list[str], str]:
-        """The marker set's name, its usual markers, those that the recording has, and what lacks: it is enough where a
-        pelvis and a leg are there, or half of the markers."""
+        """The marker set's name, its markers, those that the recording has, and what lacks: it is enough where a pelvis
+        and a leg are there, or half of the usual markers."""
         came = recording.marker_names
         try:
             chosen = self.marker_set or choose_marker_set(recording.seen_names, recording.name)
@@ -162,13 +162,13 @@ class ModelDefinition:
                 match = recognise(recording).match  # places are guessed
             except ModelError:
                 raise error.reworded(f"{error.message}; what came: {', '.join(came)}") from None
-        usual = {marker.name: marker for marker in match.marker_set.usual}
-        sides = ("right", "left", "centre")
-        expected = [marker.aliases(side)[0] for marker in usual.values() for side in sides if marker.aliases(side)]
-        found = [name for (marker, _), name in match.names.items() if marker in usual]
+        known = [(m, names[0]) for m in match.marker_set.markers for side in SIDES if (names := m.aliases(side))]
+        usual = {marker.name for marker in match.marker_set.usual}
+        found_n = sum(marker in usual for marker, _ in match.names)
         missing = lacking(match.marker_set, match.names)
-        lacks = f"nothing {'; '.join(missing)}" if missing and 2 * len(found) < len(expected) else ""
-        return match.marker_set.name, expected, found, lacks
+        too_few = missing and 2 * found_n < sum(marker.name in usual for marker, _ in known)
+        lacks = f"nothing {'; '.join(missing)}" if too_few else ""
+        return match.marker_set.name, [name for _, name in known], list(match.names.values()), lacks
 
     def calibrate(
         self, recording: Recording, *, static: Recording | None = None, how: Calibration = AUTO

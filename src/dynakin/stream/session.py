@@ -17,7 +17,6 @@ from dynakin.messages import Message, warning
 from dynakin.recordings.recording import Recording
 from dynakin.settings.defaults import DELAY_S
 from dynakin.settings.lag import live_lag
-from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.markers import LiveMarkers
 from dynakin.stream.monitor import Monitor
@@ -33,7 +32,6 @@ _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is
 _DEVIATIONS_S, _DELAYED_DEVIATIONS_S = 0.2, 1.0  # those of a lag take 0.6 steps for each of its frames
 _SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
 _CATCH_UP_S = 1.0  # with what came while the model was measured: that is left out too, but is no sign of slowness
-_MISSING = np.full(3, np.nan)
 _MASS_KG = 70.0  # of a person of whom nothing is known, so that at least the movement is seen
 
 
@@ -88,8 +86,6 @@ class Live:
         self._tracker: Tracker | None = None
         self._monitor: Monitor | None = None
         self._plates: LivePlates | None = None
-        self._feet: LiveFeet | None = None
-        self._own = np.zeros(0, dtype=int)  # places of the model's markers among the stream's, after the last: missing
         self._running = False
         self._labels_checked = False
         self._subject: dict[str, float] = {}
@@ -282,6 +278,7 @@ class Live:
         since = t - self.standing_s - 0.5 / info.rate_hz
         recent = [one for one in self._window if one.sample.time_s >= since]
         recording, static = recording_of(recent, info.names, plates, subject=self._subject), self.static
+        moving: list[Fused] = []
         waited = t - self._standing_since > self.standing_wait_s
         if not stands(recording):
             if not waited:
@@ -289,6 +286,7 @@ class Live:
             whole = recording_of(list(self._window), info.names, plates, subject=self._subject)
             recording, quiet, text = quietest(whole, weigh=not self.estimator.model.has_mass)
             static = static or quiet
+            moving = [one for one in self._window if one.sample.time_s >= recording.time[0]]
             self.say(f"Nobody stood still for {self.standing_s:g} s.")
             self.say(text if self.static is None else "Lengths and marker places are those of the standing trial.")
         try:
@@ -309,7 +307,21 @@ class Live:
         for message in said:
             self.say(message)
         self.plates.measured(said, usable)
+        self._come_up(moving)
         self._begin_running("Ready: move.")
+
+    def _come_up(self, frames: Sequence[Fused]) -> None:
+        """Step through the frames on which somebody was measured who moves: the start is the first of them, and what it
+        is off by when the session goes on would be taken for other marker places."""
+        for fused in frames:
+            try:
+                self.tracker.step(self._sample(fused))
+            except DivergenceError:
+                self._tracker = self.tracker.fresh()
+                return
+
+    def _sample(self, fused: Fused) -> Sample:
+        return fused.sample if self.plates.used else Sample(fused.sample.time_s, fused.sample.markers)
 
     def _begin_running(self, text: str) -> None:
         initial = self.tracker.calibrated
@@ -318,11 +330,6 @@ class Live:
         if self._monitor is not None:
             monitor.go_on_from(self._monitor)
         self._monitor = monitor
-        self._feet = None
-        streamed = {name: k for k, name in enumerate(self.fusion.markers.names)}
-        self._own = np.array([streamed.get(name, len(streamed)) for name in initial.recorded_markers])
-        if initial.feet:  # without plates too: what depends on the ground is then a prior
-            self._feet = LiveFeet(initial, self.estimator.noise, self.plates.names, self.estimator.plates)
         self._running = True
         self._ready_s = time.monotonic()
         self._window.clear()
@@ -334,22 +341,16 @@ class Live:
         monitor, tracker, plates = self._monitor, self.tracker, self.plates
         assert monitor is not None
         plates.checked(fused)
-        sample, feet, whole = fused.sample, None, True
-        if self._feet is not None:
-            wrenches = fused.wrenches if plates.used else None
-            markers = tracker.calibrated.ground.points_to_ground(np.vstack([fused.positions, _MISSING])[self._own])
-            markers[np.array(tracker.verdicts[: len(markers)]) == "refused"] = np.nan
-            feet, whole = self._feet.look(tracker.core_model, tracker.state, sample.time_s, wrenches, markers)
-            if wrenches is not None:
-                plates.moved(sample.time_s, markers, wrenches, self._feet.claimed, whole)
-        if not (whole and plates.used):
-            sample = Sample(sample.time_s, sample.markers)
+        sample = self._sample(fused)
         try:
-            estimate = tracker.step(sample, feet)
+            estimate = tracker.step(sample)
         except DivergenceError as error:
             self.say(f"{error.message}; the estimate starts again.")
             self.restart()
             return
+        feet, whole = tracker.feet, tracker.feet is None or tracker.feet.whole
+        if feet is not None and feet.seen is not None and plates.used and fused.wrenches is not None:
+            plates.moved(sample.time_s, feet.seen, fused.wrenches, feet.claimed, whole)
         smoothed = tracker.delayed() if tracker.lag else None
         state = tracker.state
         deviations = None
@@ -363,7 +364,7 @@ class Live:
         frame = LiveFrame(estimate, smoothed, published, fused, state, deviations, status)
         self.sinks.frame(frame)
         monitor.published(sample.time_s, time.monotonic() - fused.arrived_s)
-        news = self._feet.news() if self._feet is not None else []
+        news = [] if feet is None else feet.news()
         motion = monitor.motion(estimate, fused)
         for text in [*news, *motion, *monitor.settling(sample.time_s, state, tracker)]:
             self.say(text)

@@ -29,7 +29,7 @@ from dynakin.recordings.vertical import find_vertical
 from dynakin.results.naming import listed
 from dynakin.stream.fusion import Fused
 
-_NOW_S = 0.1  # the present posture, from a few frames
+_NOW_S = 0.5  # the present movement; in half of a walk's cycle each leg is once near to how it stands
 _KINDS = ("length", "marker", "inertia")
 
 
@@ -42,10 +42,10 @@ def check_labels(model: Definition, recording: Recording) -> str:
     name, expected, found, lacks = model.markers_among(recording)
     if lacks:
         raise ModelError(
-            f"the stream's markers do not fit the model: {len(found)} of {len(expected)} found, {lacks}; "
-            f"came: {', '.join(recording.marker_names)}; expected those of {name}: {', '.join(expected)}"
+            f"the stream's markers do not fit the model: {len(found)} of the {len(expected)} of {name} are there, "
+            f"{lacks}; came: {', '.join(recording.marker_names)}; expected: {', '.join(expected)}"
         )
-    return f"{len(found)} of the {len(expected)} markers of {name} are there."
+    return f"{name}: {len(found)} of its {len(expected)} markers are there."
 
 
 def recording_of(

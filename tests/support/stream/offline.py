@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.live.feet import LiveFeet
 from dynakin.filter.samples import Sample
-from dynakin.stream.feet import LiveFeet
 from dynakin.stream.session import Live
 
 
@@ -43,7 +43,7 @@ def seen_live(
     looking = LiveFeet(tracker.calibrated, live.estimator.noise, plates, live.estimator.plates)
     found: list[ContactLoads] = []
     for k, now in enumerate(time):
-        loads, _ = looking.look(tracker.core_model, tracker.state, float(now), wrenches[k])
+        loads = looking.look(tracker.core_model, tracker.state, float(now), wrenches[k])
         tracker.step(Sample(float(now), dict(zip(names, markers[k], strict=True))), loads)
         found.append(loads)
     arrays = [name for name, values in vars(found[0]).items() if isinstance(values, np.ndarray)]

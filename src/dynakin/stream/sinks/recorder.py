@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.errors import OutputError, RecordingError
+from dynakin.errors import ConfigError, OutputError, RecordingError
 from dynakin.messages import note, warning
 from dynakin.pipeline.result import Result
 from dynakin.pipeline.stages import run_case
@@ -224,10 +224,15 @@ def finish(folder: str | Path, output: str | Path, given: Mapping[str, Any] | No
         given: settings in the place of those of the session.
 
     Raises:
-        RecordingError: nothing was recorded there. Others: as `dynakin run`.
+        RecordingError: nothing was recorded there. ConfigError: a file that the session was told of is there no more.
+            Others: as `dynakin run`.
     """
     check_output_writable(Path(output))
     found = read_recorded(folder)
+    for key in ("static", "parameters"):
+        told = found.begun["settings"].get(key)
+        if told is not None and key not in (given or {}) and not Path(told).exists():
+            raise ConfigError(f"{folder}: the session's {key}, {told}, is there no more, expected it, or --{key} FILE")
     settings = found.begun["settings"] | (given or {}) | {"trial": Path(folder), "output": Path(output)}
     case = case_of(Settings.of(settings, "live"), recording=_recording(found, folder))
     result = run_case(case, keep=None)  # live has no option to keep it

@@ -14,6 +14,10 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.ground.declared import may_bear
 from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear
+from dynakin.filter.live.closure import DELAY_S, LiveClosure
+from dynakin.filter.live.end_of_range import EndOfRange
+from dynakin.filter.live.owners import PlateOwners
+from dynakin.filter.live.stances import DT_S, LiveStances
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import (
     AFTER_S,
@@ -26,10 +30,6 @@ from dynakin.recordings.plates.pressure import JUDGED_N, pressed_at
 from dynakin.recordings.plates.stuck import STILL_N
 from dynakin.results.naming import sentence
 from dynakin.settings.noise import Noise
-from dynakin.stream.closure import DELAY_S, LiveClosure
-from dynakin.stream.owners import PlateOwners
-from dynakin.stream.plate_samples import EndOfRange
-from dynakin.stream.stances import DT_S, LiveStances
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -45,35 +45,50 @@ class LiveFeet:
     (`LiveStances`), and for a while after (push-off); which plate carries it is what most of it says (`PlateOwners`).
 
     Args:
+        plates: names, as far as they are known (`meet`).
         assigned: plate -> "right", "left" or a declared contact, where it is known.
+
+    Attributes:
+        whole: whether the sum of the plates was the total wrench in the last frame. claimed: whether it was by what
+            feet and plates show, the motion not asked. seen: (M, 3) m, the markers of that frame as they were measured;
+            None where these were not given.
     """
 
     def __init__(
         self, initial: CalibratedModel, noise: Noise, plates: tuple[str, ...], assigned: Mapping[str, str]
     ) -> None:
-        self.initial, self.noise, self.plates = initial, noise, plates
+        self.initial, self.noise, self._assigned = initial, noise, assigned
         self.feet = tuple(initial.feet)
-        given = {p: assigned[name] for p, name in enumerate(plates) if name in assigned}
-        if unknown := [name for name in given.values() if name not in (*self.feet, *initial.contacts)]:
-            expected = ", ".join((*self.feet, *initial.contacts))
-            raise ConfigError(f"plates: {unknown[0]!r} is given a plate, expected one of {expected}")
-        contacts = [p for p, name in given.items() if name in initial.contacts]
-        assigned_feet = {p: self.feet.index(name) for p, name in given.items() if name in self.feet}
-        self._given = {p: (given[p],) for p in contacts}
         self._stances = LiveStances(initial)
-        self._owners = PlateOwners(len(self.feet), len(plates), assigned_feet, contacts)
         self._paths = ContactPaths.of(initial)
         self._highest, self._lowest = -np.inf, np.inf  # of the root, and of all markers
         self._since = np.full(len(self.feet), np.nan)  # when the stance began
         self._share: tuple[float, Array] | None = None  # when soles were looked at last, and each foot's share then
         self._floor_m = float(initial.ground.points_to_ground(np.zeros(3))[1])  # streams put plates there, too
-        self._range = EndOfRange(len(plates))
         self._closure: LiveClosure | None = None
-        self.claimed = False
-        """Whether in the last frame the plates carried all of the person by what feet and plates show."""
+        self.whole = self.claimed = False
+        self.seen: Array | None = None
         self._sideways, self._vertical = False, False  # a plate has shown a horizontal force; loaded plates show none
         self._said: set[str] = set()
         self._to_say: list[str] = []
+        self.meet(plates)
+
+    def meet(self, plates: tuple[str, ...]) -> None:
+        """From now on these are all plates that there are; which feet are on them is found anew.
+
+        Raises:
+            ConfigError: one of them is assigned to what is not there.
+        """
+        self.plates, assigned = plates, self._assigned
+        known = (*self.feet, *self.initial.contacts)
+        given = {p: assigned[name] for p, name in enumerate(plates) if name in assigned}
+        if unknown := [name for name in given.values() if name not in known]:
+            raise ConfigError(f"plates: {unknown[0]!r} is given a plate, expected one of {', '.join(known)}")
+        contacts = [p for p, name in given.items() if name in self.initial.contacts]
+        assigned_feet = {p: self.feet.index(name) for p, name in given.items() if name in self.feet}
+        self._given = {p: (given[p],) for p in contacts}
+        self._owners = PlateOwners(len(self.feet), len(plates), assigned_feet, contacts)
+        self._range = EndOfRange(len(plates))
 
     def look(
         self,
@@ -82,8 +97,8 @@ class LiveFeet:
         time_s: float,
         wrenches: Array | None,
         markers: Array | None = None,
-    ) -> tuple[ContactLoads, bool]:
-        """The feet's wrenches at a time (T = 1), and whether the sum of the plates is the total wrench.
+    ) -> ContactLoads:
+        """The feet's wrenches at a time (T = 1).
 
         Args:
             state: (n,) before the step. wrenches: (P, 6) N and N m, laboratory frame, or None. markers: (M, 3) m as
@@ -103,12 +118,12 @@ class LiveFeet:
         bears = may_bear(self.initial, paths, self._lowest, self._highest - self._lowest)
         bears &= ~np.array([name in loads.others for name in self.initial.contacts], dtype=bool)
         shear = self._shear(wrenches)
-        self.claimed = self._whole(loads, bears)
+        self.claimed, self.seen = self._whole(loads, bears), markers
         if markers is not None and wrenches is not None:
             loads = self._closed(loads, time_s, markers, places, wrenches, bears)
         undeclared = loads.elsewhere & (wrenches is not None)
-        whole = self._whole(loads, bears)
-        return expected_loads(loads, self.initial, self.noise, paths, undeclared, bears, shear), whole
+        self.whole = self._whole(loads, bears)
+        return expected_loads(loads, self.initial, self.noise, paths, undeclared, bears, shear)
 
     def _whole(self, loads: FootLoads, bears: Flags) -> bool:
         return bool(loads.total_known[0] and not bears.any() and not self._vertical)
