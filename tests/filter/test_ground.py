@@ -117,6 +117,57 @@ def test_a_short_break_in_what_pulls_is_none(break_s: float, pulls: int) -> None
     assert found is not None and len(runs(found.undeclared)) == pulls
 
 
+@pytest.fixture(scope="module")
+def running() -> SimpleNamespace:
+    """Somebody whom stances of 0.22 s throw up, 0.12 s of flight between them: what the plates read of a squat, and
+    its markers, with what such stances add. ``stance`` (T,): number of the stance, -1 in flight."""
+    recording = simulate("sagittal7", "squat", 11, 12.0).recording
+    estimator = person("sagittal7")
+    initial = estimator.start(recording).calibrated
+    markers, wrench, _ = estimator._measured(recording, initial)
+    time = recording.time - recording.time[0]
+    stance, at = np.divmod(time, 0.34)
+    push = np.where(at < 0.22, np.sin(np.pi * np.minimum(at, 0.22) / 0.22), 0.0)
+    more = WEIGHT * (push / push.mean() - 1.0)
+    speed = np.cumsum(more) / 70.0 * (time[1] - time[0])
+    path = np.append(0.0, np.cumsum(speed - speed.mean()))[:-1] * (time[1] - time[0])
+    wrench = wrench + np.outer(more, [0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    return SimpleNamespace(
+        initial=initial, time=recording.time, markers=markers, wrench=wrench, up=np.outer(path, [0.0, 1.0, 0.0]),
+        stance=np.where(at < 0.22, stance, -1.0),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("skin", "scale"), [(0.0, 1.0), (0.14, 1.0), (0.0, 1.05), (0.14, 1.05)])
+def test_what_a_runner_weighs_is_the_mean_of_what_plates_and_motion_say(
+    running: SimpleNamespace, skin: float, scale: float
+) -> None:
+    """By the peaks, of which a low-pass takes a part and to which skin adds one, a right mass was 2 kg too small."""
+    markers = running.markers + (1.0 + skin) * running.up[:, None]
+    whole = np.ones(len(markers), dtype=bool)
+    found = closure(running.initial, running.time, markers, scale * running.wrench, whole)
+    assert found is not None and not found.undeclared.any()
+    assert found.load_ratio == pytest.approx(scale, abs=0.008)
+    half_second = (running.time > running.time[0] + 5.0) & (running.time < running.time[0] + 5.5)
+    less = scale * running.wrench - np.outer(half_second, [0.0, 0.4 * WEIGHT, 0.0, 0.0, 0.0, 0.0])
+    found = closure(running.initial, running.time, markers, less, whole)
+    assert found is not None and found.undeclared[half_second].mean() > 0.8
+
+
+def test_a_flight_between_stances_off_the_plates_accuses_no_plate(running: SimpleNamespace) -> None:
+    """Feet stand there by their markers from 0.03 s too late until 0.10 s too late, and what a low-pass leads into the
+    frames between was "291 N less than the motion needs"."""
+    beside = (running.stance >= 0.0) & np.isin(running.stance % 4.0, [2.0, 3.0])
+    off = beside & np.append([False] * 3, beside[:-3])
+    for later in range(1, 11):
+        off |= np.append([False] * later, beside[:-later])
+    wrench = np.where(beside[:, None], 0.0, running.wrench)
+    markers = running.markers + running.up[:, None]
+    found = closure(running.initial, running.time, markers, wrench, ~off)
+    assert found is not None and not found.undeclared.any()
+    assert found.load_ratio == pytest.approx(1.0, abs=0.01)
+
+
 @pytest.mark.parametrize("seed", [11, 12])
 def test_a_seat_that_nothing_measures_is_noticed_and_leaves_no_moments(seed: int) -> None:
     recording = simulate("squat7", "sit-to-stand", seed, 12.0).recording

@@ -2,7 +2,8 @@
 
 The filter cannot ask itself: it takes the plates for measurements, and bends accelerations to fit them. The centre of
 mass is, within some mm, a fixed mean of the markers, so that Newton's second law can be checked before anything is
-estimated: m (g + a) on one side, the plates' forces on the other.
+estimated: m (g + a) on one side, the plates' forces on the other, both low-passed alike. Beside frames whose load is
+not measured the first holds some of that load.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms_length, runs, widened
-from dynakin.filter.ground.mass_centre import mass_centre
+from dynakin.filter.ground.load_ratio import AMPLITUDE, load_ratio, window_means
+from dynakin.filter.ground.mass_centre import REACH_S, low_passed, mass_centre
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.resampling import filled
 from dynakin.recordings.times import rate_of
 from dynakin.units import GRAVITY_M_S2
 
@@ -23,7 +26,7 @@ Flags = npt.NDArray[np.bool_]
 
 EXCESS = 0.2
 """Part of the weight that must be missing, or too much. Well measured recordings (squats, a walk, a landing, a run at
-5 m/s) stay below 0.06, the run below 0.16; a chair makes 0.5 to 1."""
+5 m/s) stay below 0.06, the run below 0.08 beyond what `AMPLITUDE` explains; a chair makes 0.5 to 1."""
 EDGE = 0.06
 """Once it is there, it lasts as long as this part is missing, but no longer than `SPREAD_S` more at either end."""
 SPREAD_S = 0.3
@@ -35,7 +38,6 @@ LASTING, LASTING_S = 0.05, 1.0
 UNSEEN = np.array([0.5, 0.3, 0.1])
 """What a body whose parts are not all marked may do more, of `EXCESS`, `EDGE` and `LASTING`, by the part of its mass
 that is not: without the upper body's markers (0.38) a walk makes 0.20, for longer than a second 0.03, squats 0.11."""
-_MASS_WITHIN, _OFTEN = 0.15, 0.2
 STATED = 0.03
 """Where a declared contact may bear all the time: the part of the weight that is still taken for a mass which is
 somewhat off (clothes, shoes), not for the contact. What the contact bears has deviations of some 7 % of the weight
@@ -105,34 +107,38 @@ def closure(
     found = mass_centre(initial, time, markers) if claimed.any() else None
     if found is None or not (found.known & claimed).any():
         return None
-    judged = found.known & claimed
     centre, acceleration, rate = found.path, found.acceleration, rate_of(time)
+    judged = found.known & ~widened(~claimed, round(REACH_S * rate))
+    have = low_passed(filled(wrench, np.asarray(~np.isfinite(wrench).all(axis=1))), rate)
     axes = np.array(initial.spec.wrench_measured[:3])
     weight = initial.weighed_kg * GRAVITY_M_S2
     need = found.needed_force(initial.weighed_kg)
-    ratio = _load_ratio(need[:, 1], wrench[:, 1], judged, weight, round(LASTING_S * rate))
-    too_much = _too_much(need[:, 1], wrench[:, 1], judged, weight, rate)
+    ratio = load_ratio(need[:, 1], have[:, 1], judged, weight, round(LASTING_S * rate), LASTING)
+    too_much = _too_much(need[:, 1], have[:, 1], judged, weight, rate)
     declared = may_bear if ratio is None or ratio < 1.0 else may_pull
     steady = ratio is not None and declared is not None and _all_the_time(ratio, judged, declared, rate)
     ratio = 1.0 if steady else ratio
     need *= 1.0 if ratio is None else ratio  # a mass that is somewhat wrong is no contact
-    missing = np.where(axes, need - wrench[:, :3], 0.0)
+    missing = np.where(axes, need - have[:, :3], 0.0)
     excess = smoothed(missing, judged, rate)
     zmp = centre - centre[:, [1]] * acceleration / (acceleration[:, [1]] + GRAVITY_M_S2).clip(1.0)
-    about = np.stack([-need[:, 1] * zmp[:, 2] - wrench[:, 3], need[:, 1] * zmp[:, 0] - wrench[:, 5]], axis=1)
-    size = np.abs(np.nan_to_num(excess)).max(axis=1) / weight
+    about = np.stack([-need[:, 1] * zmp[:, 2] - have[:, 3], need[:, 1] * zmp[:, 0] - have[:, 5]], axis=1)
+    size = np.abs(np.nan_to_num(excess)) / weight
+    by_size = AMPLITUDE * np.abs(np.nan_to_num(smoothed(need, judged, rate) / weight - [0.0, 1.0, 0.0]))
     large, edge, lasting = np.array([EXCESS, EDGE, LASTING]) + UNSEEN * initial.unseen_kg / initial.weighed_kg
-    undeclared = _with_edges(judged & (size > large), size > edge, judged, claimed, rate)
+    core = judged & (size - by_size > large).any(axis=1)
+    undeclared = _with_edges(core, (size > edge).any(axis=1), judged, claimed, rate)
     undeclared |= _small_but_lasting(excess / weight, judged & ~undeclared, round(LASTING_S * rate), lasting)
     undeclared |= _too_short_to_tell(undeclared, round(0.5 * LASTING_S * rate)) & claimed
-    for first, end in runs(claimed & ~judged):
+    unjudged: Flags = claimed & ~found.known
+    for first, end in runs(unjudged):
         load = float(np.median(wrench[first:end, 1]))
         if end - first > _UNSEEN_S * rate and abs(load - weight) > EXCESS * weight:
             undeclared[first:end] = True
     if steady and declared is not None:
         undeclared |= claimed & declared
     return Closure(
-        excess, smoothed(about, judged, rate), undeclared, int(np.sum(claimed & ~judged)), ratio,
+        excess, smoothed(about, judged, rate), undeclared, int(np.sum(unjudged)), ratio,
         (float(large), float(lasting)), too_much, steady,
     )  # fmt: skip
 
@@ -154,48 +160,17 @@ def _too_much(need: Array, have: Array, judged: Flags, weight: float, rate: floa
 def plates_misfit(initial: CalibratedModel, time: Array, markers: Array, wrench: Array) -> float | None:
     """RMS of the excess, N, over all frames in which the wrench (T, 6) is known; None where nothing can be judged."""
     found = closure(initial, time, markers, wrench, np.ones(len(time), dtype=bool))
-    if found is None:
+    if found is None or np.isnan(found.excess).all():
         return None
     return float(rms_length(found.excess))
-
-
-def _load_ratio(need: Array, have: Array, judged: Flags, weight: float, window: int) -> float | None:
-    """Mass by the plates over the declared one: the median of what is within 15 %, if that is much.
-
-    A rail that bears a tenth for more than half of the time would pass for a mass that is a tenth less: where means
-    over a window fall into two groups, the one that is nearer to the declared mass counts.
-    """
-    loaded = judged & (need > 0.5 * weight)
-    ratio = have[loaded] / need[loaded]
-    near = ratio[np.abs(ratio - 1.0) < _MASS_WITHIN]
-    if len(near) <= _OFTEN * len(need[judged]):
-        return None
-    needed, had, whole = (_window_means(np.where(judged, v, 0.0), window) for v in (need, have, judged.astype(float)))
-    means = (had / np.maximum(needed, 1.0))[(whole > 1.0 - 1e-9) & (needed > 0.5 * weight)]
-    means = means[np.abs(means - 1.0) < _MASS_WITHIN]
-    if not len(means):
-        return float(np.median(near))
-    low, high = np.percentile(means, (2.0, 98.0))
-    if high - low < LASTING:
-        return float(np.median(near))
-    groups = near[near < 0.5 * (low + high)], near[near >= 0.5 * (low + high)]
-    return min((float(np.median(group)) for group in groups if len(group)), key=lambda found: abs(found - 1.0))
-
-
-def _window_means(values: Array, window: int) -> Array:
-    """Means over the window around each frame, 0 beyond the ends: (T, ...) as given."""
-    window = max(window, 1)
-    before, unchanged = window // 2, [(0, 0)] * (values.ndim - 1)
-    sums = np.cumsum(np.pad(values, [(before + 1, window - 1 - before), *unchanged]), axis=0)
-    return np.asarray((sums[window:] - sums[:-window]) / window)
 
 
 def _small_but_lasting(excess: Array, judged: Flags, window: int, least: float) -> Flags:
     """Frames (T,) within a window that is judged throughout over which a component's mean, parts of the weight (T, 3),
     is larger than ``least``, and in which it has at least half of that."""
     filled = np.where(judged[:, None], excess, 0.0)
-    means = _window_means(filled, window)
-    whole = _window_means(judged.astype(float), window) > 1.0 - 1e-9
+    means = window_means(filled, window)
+    whole = window_means(judged.astype(float), window) > 1.0 - 1e-9
     found = np.zeros(len(judged), dtype=bool)
     for axis in range(3):
         for sign in (1.0, -1.0):

@@ -1,0 +1,87 @@
+"""The mass by the plates over the declared one, by what the motion of the centre of mass needs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.arrays import runs
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+_WITHIN, _OFTEN = 0.15, 0.2
+AMPLITUDE, LEFT_OPEN = 0.15, 0.02
+"""Part by which accelerations of the markers may be larger or smaller than the body's (skin, a trunk that bends): in a
+run or a landing single frames are no witnesses of the mass, means over a second or some strides are. Chosen on a real
+run (0.14 too large); walks, a landing and squats, which did not choose, 0.02 to 0.16. And the part of the mass that
+this may leave open of frames (walks 0.01 and less, runs 0.06): of means a cane that bears now and then is a part."""
+
+
+def load_ratio(need: Array, have: Array, judged: Flags, weight: float, window: int, apart: float) -> float | None:
+    """Mass by the plates over the declared one; None where that is within 15 % too seldom to be said.
+
+    It is the median of frames, or, where that rests too much on the size of accelerations, of means over a window (or
+    over the longest stretch that is judged) if they rest less on it. A rail that bears a tenth for more than half of
+    the time would pass for a mass that is a tenth less: where the means fall into two groups, the frames that are
+    nearer to the declared mass count.
+
+    Args:
+        need, have: (T,) N upwards, low-passed alike: what the motion needs of the declared mass, and what the plates
+            carry. judged: (T,) frames in which that can be compared. window: frames, about a second. apart: from how
+            far apart on means are two groups.
+    """
+    frames = _Loads(need, have).carrying(judged, weight)
+    if len(frames.need) <= _OFTEN * np.count_nonzero(judged):
+        return None
+    window = min(window, max(end - first for first, end in runs(judged)))
+    needed, had, whole = (window_means(np.where(judged, v, 0.0), window) for v in (need, have, judged.astype(float)))
+    found = [frames]
+    vigorous = frames.left_open(weight) > LEFT_OPEN
+    means = _Loads(needed, had).carrying(whole > 1.0 - 1e-9, weight)
+    if len(means.need):
+        low, high = np.percentile(means.have / means.need, (2.0, 98.0))
+        if high - low < apart:
+            found += [means] * vigorous
+        else:
+            lower = frames.have < 0.5 * (low + high) * frames.need
+            groups = [_Loads(frames.need[own], frames.have[own]) for own in (lower, ~lower) if own.any()]
+            found = [min(groups, key=lambda group: abs(group.ratio - 1.0))]
+    return min(found, key=lambda loads: loads.left_open(weight)).of_mass(weight)
+
+
+class _Loads(NamedTuple):
+    """What is needed of the plates and what they have, N, in frames or as means over a time."""
+
+    need: Array
+    have: Array
+
+    @property
+    def ratio(self) -> float:
+        return float(np.median(self.have / self.need))
+
+    def carrying(self, judged: Flags, weight: float) -> _Loads:
+        """Those that are judged and in which the plates carry about the person."""
+        loaded = judged & (self.need > 0.5 * weight)
+        near = loaded & (np.abs(self.have - self.need) < _WITHIN * self.need)
+        return _Loads(self.need[near], self.have[near])
+
+    def left_open(self, weight: float) -> float:
+        """Part of the ratio that the size of the accelerations may explain."""
+        needed = float(np.mean(self.need))
+        return AMPLITUDE * abs(needed - weight) / needed
+
+    def of_mass(self, weight: float) -> float:
+        """The ratio without that: the nearest to one that may be the mass'."""
+        apart = self.ratio - 1.0
+        return 1.0 + float(np.sign(apart)) * max(abs(apart) - self.left_open(weight), 0.0)
+
+
+def window_means(values: Array, window: int) -> Array:
+    """Means over the window around each frame, 0 beyond the ends: (T, ...) as given."""
+    window = max(window, 1)
+    before, unchanged = window // 2, [(0, 0)] * (values.ndim - 1)
+    sums = np.cumsum(np.pad(values, [(before + 1, window - 1 - before), *unchanged]), axis=0)
+    return np.asarray((sums[window:] - sums[:-window]) / window)
