@@ -124,7 +124,7 @@ def running() -> SimpleNamespace:
     recording = simulate("sagittal7", "squat", 11, 12.0).recording
     estimator = person("sagittal7")
     initial = estimator.start(recording).calibrated
-    markers, wrench, _ = estimator._measured(recording, initial)
+    markers, wrench, _ = estimator.measured(recording, initial)
     time = recording.time - recording.time[0]
     stance, at = np.divmod(time, 0.34)
     push = np.where(at < 0.22, np.sin(np.pi * np.minimum(at, 0.22) / 0.22), 0.0)

@@ -29,7 +29,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
 from dynakin.model.spec import free_coordinates
 from dynakin.model.state_priors import COMMON_SKIN
-from dynakin.recordings.times import step_of
+from dynakin.recordings.times import frames_apart, step_of
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import in_use, moment_sources, plates_refused
 from dynakin.results.naming import listed, words
@@ -251,7 +251,7 @@ class Systematic:
         sd = values_of(data, "state_sd")[:, self._inertia]
         together = _correlation(data["final_covariance"].values[np.ix_(self._inertia, self._inertia)])
         wrench, segments = wrenches_of(data)
-        chosen = _sampled(time)
+        chosen = frames_apart(time, SAMPLE_S)
         used = in_use(np.isfinite(values_of(data, "markers_measured")).any(axis=2), time)
         each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments, used[k]) for k in chosen]
         found = {
@@ -396,13 +396,6 @@ def _correlation(covariance: Array) -> Array:
     found: Array = scale[:, None] * covariance * scale
     np.fill_diagonal(found, 1.0)
     return found
-
-
-def _sampled(time: Array) -> npt.NDArray[np.intp]:
-    """Places of frames that lie ``SAMPLE_S`` apart or more, the first and the last among them."""
-    step = np.floor((time - time[0]) / SAMPLE_S + 1e-9)
-    chosen = np.flatnonzero(np.diff(step, prepend=-1.0) > 0)
-    return np.unique(np.append(chosen, len(time) - 1))
 
 
 def _between(time: Array, known: Array, values: Array) -> Array:

@@ -27,6 +27,13 @@ def step_of(time: Array) -> float:
     return float(np.median(np.diff(time))) if len(time) > 1 else float("nan")
 
 
+def frames_apart(time: Array, apart_s: float) -> npt.NDArray[np.intp]:
+    """Places of frames of times (T,) s that lie so far apart or more, the first and the last among them."""
+    step = np.floor((time - time[0]) / apart_s + 1e-9)
+    chosen = np.flatnonzero(np.diff(step, prepend=-1.0) > 0)
+    return np.unique(np.append(chosen, len(time) - 1))
+
+
 def rate_of(time: Array) -> float:
     """Rate of times (T,) s in Hz: the mean one where they lie about an even grid, by which stamps scatter and files
     round; that of the median step where frames are missing; NaN of fewer than two."""
