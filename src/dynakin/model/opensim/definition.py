@@ -28,6 +28,7 @@ from dynakin.model.opensim.calibrate import (
 )
 from dynakin.model.opensim.description import OpenSimModel, person_of
 from dynakin.model.opensim.feet import feet_of
+from dynakin.model.opensim.masses import doubtful_masses
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import coupled_of, in_radians, independent_coordinates, moved_by, to_spec, unseen
@@ -117,7 +118,7 @@ class OpenSimDefinition:
         source, options, messages = (
             self.source,
             self.options,
-            [note("calibration", text) for text in self.source.left_out],
+            [*(note("calibration", text) for text in self.source.left_out), *doubtful_masses(self.source)],
         )
         find = find_laboratory_frame if source.floating else find_ground_frame
         chosen, measured_by = sites(source, options.leave_out, recording)
@@ -241,9 +242,12 @@ def load_opensim(
         options: what can be estimated; ``fields`` are single ones of it (``scale=None``).
 
     Raises:
-        ModelError: the file or an option is wrong, or holds what is not supported; its place is named.
+        ModelError: the file or an option is wrong, or holds what is not supported (bodies without mass); its place is
+            named.
     """
     source = person_of(read_osim(path))
+    if source.mass == 0.0:
+        raise ModelError(f"{source.path}: the bodies of the person have no mass, expected each body's (kg)")
     if problem := gravity_problem(source.gravity):
         raise ModelError(f"{source.path}: gravity: {problem}")
     given = {} if options is None else options.model_dump()
