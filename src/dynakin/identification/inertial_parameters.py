@@ -54,7 +54,7 @@ class InertialPriors:
     """Part of its deviation by which the trunk's centre of mass may be identified, where its joint on the pelvis is
     known to 30 mm (`error_sizes.spine_centre`) and the table is for persons of this physique. Plates show where it lies
     in the room; moments of the joint need how far it lies from the joint, and in the table both go together. L5/S1 of
-    fast walks 40 and 42 was 7.9 and 7.0 N m off with 1, 4.4 and 5.8 with 0.1 (4.6 and 5.0 with the table); judged on
+    fast walks 40 and 42 was 7.9 and 7.0 N m off with 1, 4.5 and 5.8 with 0.1 (4.6 and 5.0 with the table); judged on
     41, 44 and `truth3d` 3 and 4 (docs/identification.md)."""
 
 
