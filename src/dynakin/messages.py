@@ -41,6 +41,7 @@ Topic = Literal[
     "ankles",  # feet that nothing shows flat
     "identified",  # parameters of a subject file, and what they come from
     "scaling",  # a model that does not fit the person
+    "masses",  # a model's file whose masses are hardly a person's
     "range",  # a model whose file clamps what the person does
     "noise",  # how large it was found
     "low-passed",  # markers that were filtered before they were given

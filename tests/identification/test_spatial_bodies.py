@@ -7,8 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dynakin.filter.estimator import Estimator
 from dynakin.identification.inertial_parameters import InertialParameters, InertialPriors
+from dynakin.model.definition import load_model
 from dynakin.model.inertia import RigidBody
+from dynakin.settings import presets
+from dynakin.settings.subject import Subject
+from dynakin.simulation.trial import simulate
 
 _RNG = np.random.default_rng(7)
 _NAMES = ("pelvis", "thigh_r", "thigh_l", "head")
@@ -96,3 +101,49 @@ def test_covariance_counts_that_sides_may_differ_and_keeps_the_total() -> None:
     difference = np.zeros(len(P))
     difference[10], difference[20] = 1.0, -1.0
     assert difference @ P @ difference == pytest.approx(2.0 * (0.025 * 9.0) ** 2, rel=1e-6)
+
+
+def _sd(bodies: InertialParameters, name: str) -> np.ndarray:
+    """Of phi at the table, by the prior, of the segment's mass and first moments over its mass."""
+    found = np.sqrt(np.diag(bodies.covariance(np.zeros(len(bodies.sd)), np.diag(bodies.sd**2))))
+    at = 10 * bodies.segments.index(name)
+    return np.asarray(found[at : at + 4])
+
+
+def test_a_shoe_widens_the_mass_and_where_it_lies() -> None:
+    """Regardless of the segment's own mass: a light foot's by more than half, a thigh's hardly."""
+    shod = InertialParameters.in_space(
+        _NAMES, 35.0, _MASS, _CENTRE, _ROOT, InertialPriors(), worn_kg=np.array([0.0, 0.5, 0.5, 3.0])
+    )
+    at = [k for k, name in enumerate(shod.unknowns) if name.startswith(("body/thigh/", "body/head/"))]
+    bare, more = BODIES.sd[at].reshape(2, 10), shod.sd[at].reshape(2, 10)
+    np.testing.assert_allclose(more[:, 0] ** 2 - bare[:, 0] ** 2, [(0.5 / 9.0) ** 2, (3.0 / 5.0) ** 2])
+    wide = np.sqrt(np.diagonal(_ROOT[[1, 3]] @ _ROOT[[1, 3]].swapaxes(1, 2), axis1=1, axis2=2))
+    share = np.array([[0.5 / 9.0], [3.0 / 5.0]])
+    np.testing.assert_allclose(more[:, 1:4] ** 2 - bare[:, 1:4] ** 2, (share * wide) ** 2)
+    np.testing.assert_array_equal(more[:, 4:], bare[:, 4:])
+
+
+def test_a_trunk_whose_joint_is_unsure_keeps_its_centre_and_its_doubt() -> None:
+    held = InertialParameters.in_space(
+        _NAMES, 35.0, _MASS, _CENTRE, _ROOT, InertialPriors(), trunks=[name == "head" for name in _NAMES]
+    )
+    at = [held.unknowns.index(f"body/head/c{axis}") for axis in "xyz"]
+    np.testing.assert_allclose(held.sd[at], InertialPriors().trunk_centre * BODIES.sd[at])
+    np.testing.assert_array_equal(np.delete(held.sd, at), np.delete(BODIES.sd, at))
+    np.testing.assert_allclose(_sd(held, "head"), _sd(BODIES, "head"))  # not less known than it was
+
+
+@pytest.mark.parametrize(("kg", "held"), [(75.0, True), (120.0, False)])
+def test_a_person_may_wear_what_a_run_says_and_a_belly_shows(kg: float, held: bool) -> None:
+    sim = simulate("fullbody", "squat", 1, 5.0, 50.0)
+    estimator = Estimator(load_model("fullbody", Subject(mass_kg=kg, height_m=1.75)), presets.default())
+    initial = estimator.start(sim.recording).calibrated
+    bodies = InertialParameters.of(initial)
+    for k, name in enumerate(bodies.segments):
+        own = bodies.unknowns.index(f"body/{name.removesuffix('_l').removesuffix('_r')}/a")
+        expected = initial.sd0[initial.names.index(f"inertia/{name}/mass")] / bodies.mass[k]
+        assert bodies.sd[own] == pytest.approx(expected)
+    assert bodies.sd[bodies.unknowns.index("body/foot/a")] > 0.3
+    wide = bodies.sd[bodies.unknowns.index("body/torso/cx")]
+    assert (wide < 0.003) == held and (wide > 0.01) != held

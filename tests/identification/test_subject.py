@@ -38,7 +38,7 @@ def test_a_subject_says_by_how_much_it_predicts_better(identified: Identificatio
     held_out = identified.subject.held_out
     assert held_out is not None and len(held_out.parts) == 4 and held_out.components == ("fx", "fy", "mz")
     gain = 100.0 * (1.0 - (np.array(held_out.bodies) / np.array(held_out.table)).mean())
-    assert f"predicted {gain:+z.0f} % better (FX" in held_out.in_words()
+    assert f"predicted {gain:+z.0f} % better from markers alone (FX" in held_out.in_words()
     used = with_identified(case.common.initial, identified.subject.model_copy(update={"use": "bodies"}))
     assert str(used.messages[-1]).endswith(f"{held_out.in_words()}.")
     before = identified.subject.model_copy(update={"held_out": None})  # a file of an earlier version

@@ -77,7 +77,10 @@ class Decision:
             said.append(f"{use.capitalize()}: {', '.join(each)}.")
         gain = 100.0 * (1.0 - self.ratios("bodies").mean())
         worst = 100.0 * (self.ratios("bodies").max() - 1.0)
-        verdict = f"held-out gain {gain:z.0f} % (mean over components and parts; at the worst part {-worst:+z.0f} %)"
+        verdict = (
+            f"held-out gain {gain:z.0f} % of the wrench without plates (mean over components and parts; at the worst "
+            f"part {-worst:+z.0f} %)"
+        )
         said.append(f"Not low-passed, the gain is {100.0 * (1.0 - self.full_band_ratios('bodies').mean()):z.0f} %.")
         if self.use == "table":
             return [

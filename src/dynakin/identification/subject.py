@@ -21,6 +21,7 @@ from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.messages import Message, warning, warnings_of
 from dynakin.model.identified import Batch, HeldOut, IdentifiedSubject
 from dynakin.progress import Progress
+from dynakin.recordings.companions import of_most
 from dynakin.recordings.recording import Recording
 from dynakin.settings import presets
 from dynakin.settings.lag import can_smooth
@@ -109,7 +110,8 @@ def _followed(
     estimator: Estimator, recordings: Sequence[Recording], static: Recording | None, progress: Progress
 ) -> tuple[Common, list[MeasuredTrial], list[Message]]:
     """The trials in which the filter followed the person, and a sentence on each of the others."""
-    common, lost = Common.measure(estimator, recordings[0], static), dict[int, str]()
+    common = Common.measure(estimator, recordings[0], static, of_most(recordings, static))
+    lost: dict[int, str] = {}
     trials = measure_all(common, recordings, progress, lost)
     if len(trials) < min(len(recordings), 2):
         left = "one trial is" if trials else "no trial is"

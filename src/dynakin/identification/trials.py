@@ -114,23 +114,30 @@ class Common:
     """The model as measured on the subject's first trial, which all trials share.
 
     Attributes:
-        estimator: how trials are filtered. initial: as measured. first: on whose markers. static: the standing trial,
-            or the first one.
+        estimator: how trials are filtered. initial: as measured. reference: whose person and markers all trials show.
+            static: the standing trial, or the first one.
         core: with lengths and inertia among its states.
     """
 
     estimator: Estimator
     initial: CalibratedModel
-    first: Recording
+    reference: Recording
     static: Recording
     core: _core.Model
 
     @classmethod
-    def measure(cls, estimator: Estimator, first: Recording, static: Recording | None = None) -> Common:
+    def measure(
+        cls,
+        estimator: Estimator,
+        first: Recording,
+        static: Recording | None = None,
+        reference: Recording | None = None,
+    ) -> Common:
         """Measure the model on the markers of the first trial; only a standing trial's plates may give the mass.
 
         Args:
             estimator: model and noise; preset default or another one that has a smoother.
+            reference: who the person is (`companions.of_most`); the first trial where not given.
 
         Raises:
             ModelError, RecordingError: as `Estimator.start`.
@@ -142,7 +149,7 @@ class Common:
                 "(--static): it must not come from the plates of a held-out trial"
             )
         initial = estimator.start(replace(first, plates=()), static=static).calibrated
-        return cls(estimator, initial, first, static or first, _core.Model(initial.spec))
+        return cls(estimator, initial, reference or first, static or first, _core.Model(initial.spec))
 
     def tracker(self) -> Tracker:
         """A filter that starts from the model as it was measured."""
@@ -224,12 +231,12 @@ class Common:
         """Whether a trial can be identified on: before anything that takes long.
 
         Raises:
-            ModelError, RecordingError: its markers are others than the first trial's, or another person's; it has no
+            ModelError, RecordingError: its markers are others than the reference's, or another person's; it has no
                 plates, they are refused, they carry somebody of another mass, or what does not fit the motion leaves
                 less than a second of them.
         """
         where = recording.path or recording.name
-        if other := another_person(recording, self.first):
+        if other := another_person(recording, self.reference):
             raise RecordingError(f"{where}: {other}; expected trials of one person with the same markers")
         if not recording.plates:
             raise RecordingError(f"{where}: no force plates, expected at least one; give its ground forces (--forces)")

@@ -71,7 +71,7 @@ class Unknowns:
             ModelError: the model does not estimate what can be identified.
         """
         priors = GeometryPriors()
-        inertial = InertialParameters.of(common.initial)
+        inertial = InertialParameters.of(common.initial, common.estimator.priors)
         names = list(common.core.layout.names)
         turning = {
             axis.coordinate

@@ -84,7 +84,10 @@ class HeldOut(Strict):
         """The gain of the identified inertia over the table, over all and by component."""
         gain = 100.0 * (1.0 - (np.array(self.bodies) / np.array(self.table)).mean(axis=0))
         each = [f"{name.upper()} {value:+z.0f} %" for name, value in zip(self.components, gain, strict=True)]
-        return f"trials that were left out are predicted {gain.mean():+z.0f} % better ({', '.join(each)})"
+        return (
+            f"of trials that were left out the wrench is predicted {gain.mean():+z.0f} % better from markers alone "
+            f"({', '.join(each)}), which is no measure of moments on plates"
+        )
 
 
 class IdentifiedSubject(Strict):

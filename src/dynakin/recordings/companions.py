@@ -6,7 +6,7 @@ By names, then by what is in the files. It is offered, never taken: a name is no
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import combinations
 from pathlib import Path
@@ -108,6 +108,13 @@ def another_person(trial: Recording, other: Recording) -> str:
         f"distances between markers that move as one differ by {1e3 * apart:.0f} mm from those in {other.name} "
         f"(median; of one person by {1e3 * _SAME_M:.0f} mm at most): another person, or markers put on anew"
     )
+
+
+def of_most(trials: Sequence[Recording], static: Recording | None = None) -> Recording:
+    """The recording whose person and markers most of the trials show, in whatever order they come; of several the
+    standing one, then the first."""
+    those = [static, *trials] if static is not None else list(trials)
+    return max(those, key=lambda one: sum(not another_person(trial, one) for trial in trials))
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from dynakin.studies.batch.dataset import Dataset, read_dataset
 from dynakin.studies.batch.subjects import IdentifyOptions, identify_on_trials, subject_tasks, with_parameters
 
 TRIALS = {"squat": ("squat", 6.0), "squats": ("squat", 9.0), "sway": ("sway", 6.0)}
+PATHS = {"markers": "trc", "forces": "mot"}
 KEYS = 'model = "sagittal7"\nmarkers = "opencap"\noutput = "out"\ntrials = "*/markers.trc"\nforces = "forces.mot"\n'
 SUBJECT = '[[subjects]]\nname = "S1"\nmass_kg = 70.0\nheight_m = 1.75\nsex = "male"\n'
 
@@ -91,3 +93,19 @@ def test_command_line(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture
     assert (tmp_path / "out" / "S1" / "subject.toml").is_file() == used and bool(written["subjects"]) == used
     assert main(["batch", *arguments]) == 0  # goes on: nothing is left to do
     assert json.loads((tmp_path / "out" / "batch.json").read_text())["subjects"] == written["subjects"]
+
+
+def test_another_person_is_left_out_wherever_its_name_stands(
+    study: Path, dataset: Dataset, row: dict[str, Any], tmp_path: Path
+) -> None:
+    """The trials that agree say who the subject is, not the one whose name comes first."""
+    simulate("sagittal7", "squat", 3, 5.0, 50.0, height_m=1.4, mass_kg=70.0).save(tmp_path / "S1" / "other")
+    one = dataset.sessions[0]
+    paths = {key: str(tmp_path / "S1" / "other" / f"{key}.{end}") for key, end in PATHS.items()}
+    stranger = replace(one, trial="other", content=one.content | {"trial": paths["markers"], "forces": paths["forces"]})
+    for order in ([stranger, *dataset.sessions], [*dataset.sessions, stranger]):
+        said = identify_on_trials(IdentifyOptions(tmp_path / "out"), order)
+        assert said["use"] == "bodies" and said["said"][1:] == row["said"]
+        assert re.fullmatch(r"Left out: S1/other: .* from those in \w+ \(median.*another person.*", said["said"][0])
+        assert "in markers" not in said["said"][0]
+        assert sorted(read_identified(Path(said["file"])).trials) == sorted(TRIALS)

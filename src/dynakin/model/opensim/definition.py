@@ -36,6 +36,7 @@ from dynakin.model.opensim.calibrate import (
 )
 from dynakin.model.opensim.description import Marker, OpenSimModel, person_of
 from dynakin.model.opensim.feet import feet_of
+from dynakin.model.opensim.masses import doubtful_masses
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import coupled_of, in_radians, independent_coordinates, moved_by, to_spec, unseen
@@ -117,7 +118,7 @@ class OpenSimDefinition:
         """As ``Definition.calibrate``; the side does not matter, for the file says where its markers are. The ground is
         the laboratory, Y up; X is forward where it is asked for, or where the file holds the body so that it cannot
         head anywhere."""
-        messages = [note("calibration", text) for text in self.source.left_out]
+        messages = [*(note("calibration", text) for text in self.source.left_out), *doubtful_masses(self.source)]
         source, chosen, feet, frame = self._frame_and_feet(recording, static, how, messages)
         lock, estimated = self._body(source, chosen, messages)
         names = tuple(name for _, name in chosen)
@@ -255,9 +256,12 @@ def load_opensim(
         options: what can be estimated; ``fields`` are single ones of it (``scale=None``).
 
     Raises:
-        ModelError: the file or an option is wrong, or holds what is not supported; its place is named.
+        ModelError: the file or an option is wrong, or holds what is not supported (bodies without mass); its place is
+            named.
     """
     source = person_of(read_osim(path))
+    if source.mass == 0.0:
+        raise ModelError(f"{source.path}: the bodies of the person have no mass, expected each body's (kg)")
     if problem := gravity_problem(source.gravity):
         raise ModelError(f"{source.path}: gravity: {problem}")
     given = {} if options is None else options.model_dump()

@@ -58,13 +58,7 @@ def sites(
 
 
 def with_mass(source: OpenSimModel, mass_kg: float) -> OpenSimModel:
-    """The same model with all masses and inertias multiplied so that they sum to ``mass_kg``.
-
-    Raises:
-        ModelError: the model has no mass.
-    """
-    if source.mass == 0.0:
-        raise ModelError(f"{source.path}: the bodies have no mass, expected some to scale to {mass_kg:g} kg")
+    """The same model with all masses and inertias multiplied so that they sum to ``mass_kg``."""
     factor = mass_kg / source.mass
     bodies = tuple(
         replace(body, mass=factor * body.mass, inertia=tuple(factor * value for value in body.inertia))

@@ -56,6 +56,12 @@ _KINDS = (
         "standing trial, or run without --model: fullbody measures its own.",
     ),
     _Kind(
+        "Model's masses",
+        ("masses",),
+        "Correct these masses in the model's file (a prosthesis may rightly be light), or run without --model: "
+        "fullbody has a table's.",
+    ),
+    _Kind(
         "Identified parameters",
         ("identified",),
         "Identify again on trials without a warning, or run without --parameters.",

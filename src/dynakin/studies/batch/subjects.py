@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.identification.subject import identify_subject
 from dynakin.identification.trials import Common
 from dynakin.progress import Progress
+from dynakin.recordings.companions import another_person, of_most
 from dynakin.recordings.recording import Recording
 from dynakin.settings import presets
 from dynakin.settings.lag import can_smooth
@@ -21,7 +23,7 @@ from dynakin.studies.batch.dataset import Dataset, Session
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool, work
 from dynakin.studies.engine.tasks import Outcome, Task
-from dynakin.validation.case import case_of
+from dynakin.validation.case import Case, case_of
 
 FILE = "subject.toml"
 """What identification writes into a subject's folder, and what its trials take as `parameters`."""
@@ -131,32 +133,53 @@ def _trials(sessions: Sequence[Session]) -> tuple[Estimator, list[Recording], Re
     if any(keys != alike[0] for keys in alike):
         other = next(s.name for s, keys in zip(sessions, alike, strict=True) if keys != alike[0])
         raise DynakinError(f"{other} has other settings than {sessions[0].name}, expected the same for all its trials")
-    chosen: list[Recording] = []
     said: list[str] = []
-    estimator: Estimator | None = None
-    static: Recording | None = None
+    cases = _with_plates(sessions, said)
+    first = list(islice(cases, MOST_TRIALS))
+    if not first:
+        raise DynakinError("; ".join(said))
+    estimator, static = estimator_of(first[0][1].config), first[0][1].static
+    if not can_smooth(estimator.noise):
+        estimator = replace(estimator, noise=presets.default())
+    reference = of_most([case.recording for _, case in first], static)
+    chosen: list[Recording] = []
     common: Common | None = None
-    for session in sessions:
+    for session, case in chain(first, cases):
         if len(chosen) == MOST_TRIALS:
             break
         try:
-            case = case_of(Settings.of(session.content, session.name))
-            if estimator is None:
-                estimator, static = estimator_of(case.config), case.static
-                if not can_smooth(estimator.noise):
-                    estimator = replace(estimator, noise=presets.default())
-            if not case.recording.plates:
-                said.append(f"{session.name} has no force plates")
-                continue
-            common = common or Common.measure(estimator, case.recording, static)
+            common = common or _measured(estimator, case, reference)
             common.check(case.recording)
         except DynakinError as error:
             said.append(f"{session.name}: {error.message}")
             continue
-        chosen.append(replace(case.recording, name=session.trial))
-    if estimator is None:
-        raise DynakinError("; ".join(said))
+        chosen.append(case.recording)
     return estimator, chosen, static, said
+
+
+def _with_plates(sessions: Sequence[Session], said: list[str]) -> Iterator[tuple[Session, Case]]:
+    """Trials that can be read and have plates, under their names in the dataset; ``said`` takes what others lack."""
+    for session in sessions:
+        try:
+            case = case_of(Settings.of(session.content, session.name))
+        except DynakinError as error:
+            said.append(f"{session.name}: {error.message}")
+            continue
+        if case.recording.plates:
+            yield session, replace(case, recording=replace(case.recording, name=session.trial))
+        else:
+            said.append(f"{session.name} has no force plates")
+
+
+def _measured(estimator: Estimator, case: Case, reference: Recording) -> Common:
+    """The model as measured on a trial of the person of ``reference``.
+
+    Raises:
+        DynakinError: it shows somebody else, or cannot be measured on.
+    """
+    if other := another_person(case.recording, reference):
+        raise DynakinError(f"{case.recording.path or case.recording.name}: {other}")
+    return Common.measure(estimator, case.recording, case.static, reference)
 
 
 def _shared(content: Mapping[str, Any]) -> dict[str, Any]:
