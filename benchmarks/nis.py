@@ -30,10 +30,10 @@ from recordings import Trial as Known
 
 KEPT = ROOT / "build" / "nis"
 LONGEST_S = 20.0
-GROUPS: tuple[JointGroup, ...] = ("pelvis", "upper_body", "hips", "knees", "feet")
+GROUPS: tuple[JointGroup, ...] = ("pelvis", "trunk_rotation", "upper_body", "hips", "knees", "feet")
 HEAD = (
     "| recording | NIS, declared | NIS, calibrated | of markers alone | of plates alone | variance scale "
-    "| jerk scales: pelvis, upper body, hips, knees, feet |\n|---|---|---|---|---|---|---|"
+    "| jerk scales: pelvis, trunk's rotation, upper body, hips, knees, feet |\n|---|---|---|---|---|---|---|"
 )
 
 

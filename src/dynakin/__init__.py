@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from dynakin.filter.samples import Sample
     from dynakin.filter.tracker import Tracker
     from dynakin.model.calibration.calibrated import CalibratedModel
+    from dynakin.model.calibration.how import Calibration
     from dynakin.model.definition import ModelDefinition, load_model
     from dynakin.model.opensim.definition import load_opensim
     from dynakin.pipeline.result import Result
@@ -29,6 +30,7 @@ __version__ = metadata.version("dynakin")
 __all__ = [
     "Bounds",
     "CalibratedModel",
+    "Calibration",
     "DynakinError",
     "Estimate",
     "Estimator",
@@ -56,6 +58,7 @@ __getattr__, __dir__ = loaded_when_asked(
         "filter.samples": ("Sample",),
         "filter.tracker": ("Tracker",),
         "model.calibration.calibrated": ("CalibratedModel",),
+        "model.calibration.how": ("Calibration",),
         "model.definition": ("ModelDefinition", "load_model"),
         "model.opensim.definition": ("load_opensim",),
         "pipeline.result": ("Result",),

@@ -87,6 +87,22 @@ def test_plates_that_carry_the_person_are_found_to(model: str, motion: str, seed
     assert found.load_ratio == pytest.approx(1.0, abs=0.02)
 
 
+def test_what_cannot_be_judged_beside_unclaimed_frames_is_as_what_is_judged_beside_it() -> None:
+    """A rail that bears a tenth in all of a stretch, 42 ms of which lie too near to frames that nobody claims."""
+    recording = simulate("fullbody", "squat", 11, 12.0).recording
+    estimator = person("fullbody")
+    initial = estimator.start(recording).calibrated
+    markers, wrench, _ = estimator.measured(recording, initial)
+    time = recording.time - recording.time[0]
+    rail = (time >= 4.0) & (time < 6.0)
+    less = wrench - np.outer(rail, [0.0, 0.1 * WEIGHT, 0.0, 0.0, 0.0, 0.0])
+    claimed = (time < 3.8) | rail | (time >= 6.2)
+    found = closure(initial, recording.time, markers, less, claimed)
+    assert found is not None and (found.undeclared == rail).all()
+    short = claimed & (np.mod(time, 1.0) < 0.05)  # too near to unclaimed frames, all of them
+    assert closure(initial, recording.time, markers, wrench, short) is None
+
+
 @pytest.mark.parametrize(("away_m", "borne"), [(0.0, False), (0.8, True)])
 def test_without_plates_nothing_is_the_feets_alone_where_they_are_not_under_the_person(
     away_m: float, borne: bool

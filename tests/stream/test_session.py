@@ -104,7 +104,7 @@ def test_wrong_labels_list_what_came_and_what_was_expected(squat: Recording) -> 
     strange = replace(squat, marker_names=tuple(f"ball{k}" for k in range(len(squat.marker_names))))
     with pytest.raises(
         ModelError,
-        match=r"0 of the 53 of opencap are there, nothing on the pelvis.*; came: ball0, ball1.*L_HJC_reg$",
+        match=r"0 of the 53 markers of opencap are there, nothing on the pelvis.*; came: ball0, ball1.*L_HJC_reg$",
     ):
         run(Replay(strange, speed=0.0))
 

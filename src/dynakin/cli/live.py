@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 # Seconds of standing that are asked for, and how long they are waited for.
 _LIVE_STANDING_S, _REPLAY_STANDING_S = (2.0, 20.0), (2.0, 3.0)
-_FILES = frozenset({"static", "parameters"})
+_FILES = frozenset({"model", "markers", "table", "preset", "static", "parameters"})
 _HOST, _PORT = "127.0.0.1", 8080
 _SHORT_S, _SHORT_STANDING_S = 6.0, 0.4
 
@@ -95,7 +95,8 @@ def live(
     elif parameters is not None:
         given["parameters"] = parameters
     for key in _FILES & given.keys():  # which a recording names, wherever it is finished
-        given[key] = str(Path(given[key]).absolute())
+        if (file := Path(given[key])).is_file() or key == "static":
+            given[key] = str(file.absolute())
     if finish_folder is not None:
         if output is None:
             raise typer.BadParameter("--finish needs -o OUT, the folder for the results")

@@ -123,6 +123,7 @@ ONE_SIDED = 0.010 / LANDMARKS.hinge_centre
 measured (`docs/validation/geometry.md`), or whose markers sit otherwise in the standing trial."""
 OF_HIPS: dict[Hips, dict[str, float]] = {
     "measured": {},
+    "functional": {},
     "supposed": {"thigh": 3.0},
     "proportions": dict.fromkeys(("thigh", "shank", "foot"), 10.0),
 }

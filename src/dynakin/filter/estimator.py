@@ -330,8 +330,7 @@ class Estimator:
             notes += [place] if place else []
         if tracker.systematic is not None:
             notes += tracker.systematic.misfit(arrays["state"][-1])
-        followed = np.isfinite(arrays["state"]).all(axis=1)
-        turned = hips_turned(calibrated, arrays["state"][followed])
+        turned = hips_turned(calibrated, arrays["state"])
         systematic = tracker.systematic and tracker.systematic.with_found(
             ground.clock_sd_s, ground.in_hands_kg, skin_found(calibrated, arrays), turned
         )

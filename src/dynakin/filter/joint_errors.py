@@ -108,9 +108,10 @@ class JointErrors:
         )
 
     def hips_open_m(self, calibrated: CalibratedModel) -> Array:
-        """(S,) m, what the priors leave open of the centres of hips along each source; 0 of all others."""
+        """(S,) m, what the priors leave open of the centres of hips along each source; 0 of all others, and of hips
+        that no regression from the pelvis has."""
         found = np.zeros(len(self.kinds))
-        if calibrated.plan is None:
+        if calibrated.plan is None or calibrated.provenance.hips == "functional":
             return found
         sd = dict(zip(calibrated.names, calibrated.sd0, strict=True))
         for name in thighs_of(calibrated):
@@ -276,9 +277,11 @@ def hips_turned(calibrated: CalibratedModel, q: Array) -> float:
     together; infinite where there are no hips or no frames."""
     spec, thighs = calibrated.spec, thighs_of(calibrated)
     place = {name: k for k, name in enumerate(free_names(spec))}
-    axes = [axis for segment in spec.segments if segment.name in thighs for axis in segment.axes]
-    own = sorted({place[axis.coordinate] for axis in axes if axis.kind == "rotation" and axis.coordinate in place})
-    return float(np.sqrt(q[:, own].var(axis=0).sum() / len(thighs))) if own and len(q) else np.inf
+    legs = [{place[axis.coordinate] for axis in segment.axes if axis.kind == "rotation" and axis.coordinate in place}
+            for segment in spec.segments if segment.name in thighs]  # fmt: skip
+    own, turning = sorted(set().union(*legs)), sum(map(bool, legs))
+    q = q[np.isfinite(q).all(axis=1)]
+    return float(np.sqrt(q[:, own].var(axis=0).sum() / turning)) if own and len(q) else np.inf
 
 
 def neutral(calibrated: CalibratedModel) -> Array:

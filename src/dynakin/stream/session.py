@@ -316,7 +316,8 @@ class Live:
         for fused in frames:
             try:
                 self.tracker.step(self._sample(fused))
-            except DivergenceError:
+            except DivergenceError as error:
+                self.say(f"{error.message}; the estimate starts again.")
                 self._tracker = self.tracker.fresh()
                 return
 

@@ -42,8 +42,8 @@ def check_labels(model: Definition, recording: Recording) -> str:
     name, expected, found, lacks = model.markers_among(recording)
     if lacks:
         raise ModelError(
-            f"the stream's markers do not fit the model: {len(found)} of the {len(expected)} of {name} are there, "
-            f"{lacks}; came: {', '.join(recording.marker_names)}; expected: {', '.join(expected)}"
+            f"the stream's markers do not fit the model: {len(found)} of the {len(expected)} markers of {name} are "
+            f"there, {lacks}; came: {', '.join(recording.marker_names)}; expected: {', '.join(expected)}"
         )
     return f"{name}: {len(found)} of its {len(expected)} markers are there."
 

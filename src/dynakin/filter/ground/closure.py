@@ -60,8 +60,8 @@ class Closure:
             the body does not turn.
         undeclared: (T,) frames in which something bears (or pulls) the person that no plate measures.
         unjudged: number of claimed frames in which too few markers are seen, or which lie at an end.
-        load_ratio: the plates' load over that of the declared mass where they carry the person; None where that is
-            within 15 % too seldom to be said.
+        load_ratio: the plates' load over that of the declared mass where they carry the person, as near to one as the
+            size of accelerations allows (`load_ratio`); None where that is within 15 % too seldom to be said.
         limits: parts of the weight from which on, at once and for longer than a second, something is missing.
         too_much: the plates' load over what the motion needs where that is far too large, and the same all the time.
         steady: what is missing all the time is a declared contact's: its size rests on the mass that was stated.
@@ -105,10 +105,12 @@ def closure(
     """
     claimed = claimed & np.isfinite(wrench).all(axis=1)
     found = mass_centre(initial, time, markers) if claimed.any() else None
-    if found is None or not (found.known & claimed).any():
+    if found is None:
         return None
     centre, acceleration, rate = found.path, found.acceleration, rate_of(time)
     judged = found.known & ~widened(~claimed, round(REACH_S * rate))
+    if not judged.any():
+        return None
     have = low_passed(filled(wrench, np.asarray(~np.isfinite(wrench).all(axis=1))), rate)
     axes = np.array(initial.spec.wrench_measured[:3])
     weight = initial.weighed_kg * GRAVITY_M_S2
@@ -127,7 +129,8 @@ def closure(
     by_size = AMPLITUDE * np.abs(np.nan_to_num(smoothed(need, judged, rate) / weight - [0.0, 1.0, 0.0]))
     large, edge, lasting = np.array([EXCESS, EDGE, LASTING]) + UNSEEN * initial.unseen_kg / initial.weighed_kg
     core = judged & (size - by_size > large).any(axis=1)
-    undeclared = _with_edges(core, (size > edge).any(axis=1), judged, claimed, rate)
+    undeclared = _with_edges(core, (size > edge).any(axis=1), judged, rate) & claimed
+    undeclared |= _as_beside(undeclared, judged, claimed)
     undeclared |= _small_but_lasting(excess / weight, judged & ~undeclared, round(LASTING_S * rate), lasting)
     undeclared |= _too_short_to_tell(undeclared, round(0.5 * LASTING_S * rate)) & claimed
     unjudged: Flags = claimed & ~found.known
@@ -135,6 +138,7 @@ def closure(
         load = float(np.median(wrench[first:end, 1]))
         if end - first > _UNSEEN_S * rate and abs(load - weight) > EXCESS * weight:
             undeclared[first:end] = True
+    undeclared |= _as_beside(undeclared, judged, claimed)
     if steady and declared is not None:
         undeclared |= claimed & declared
     return Closure(
@@ -160,9 +164,7 @@ def _too_much(need: Array, have: Array, judged: Flags, weight: float, rate: floa
 def plates_misfit(initial: CalibratedModel, time: Array, markers: Array, wrench: Array) -> float | None:
     """RMS of the excess, N, over all frames in which the wrench (T, 6) is known; None where nothing can be judged."""
     found = closure(initial, time, markers, wrench, np.ones(len(time), dtype=bool))
-    if found is None or np.isnan(found.excess).all():
-        return None
-    return float(rms_length(found.excess))
+    return None if found is None else float(rms_length(found.excess))
 
 
 def _small_but_lasting(excess: Array, judged: Flags, window: int, least: float) -> Flags:
@@ -188,16 +190,21 @@ def _too_short_to_tell(found: Flags, window: int) -> Flags:
     return breaks
 
 
-def _with_edges(core: Flags, some: Flags, judged: Flags, claimed: Flags, rate: float) -> Flags:
+def _with_edges(core: Flags, some: Flags, judged: Flags, rate: float) -> Flags:
     """Frames in which the excess is large, with those before and after in which it comes and goes."""
     near = widened(core, round(SPREAD_S * rate)) & (~judged | some)
     found = core.copy()
     for first, end in runs(near):
         found[first:end] |= core[first:end].any()
-    found &= claimed
-    for first, end in runs(~judged & claimed):  # not judged: as its neighbours are
-        sides = [bool(found[k]) for k in (first - 1, end) if 0 <= k < len(found)]
-        found[first:end] |= bool(sides) and all(sides)
+    return found
+
+
+def _as_beside(undeclared: Flags, judged: Flags, claimed: Flags) -> Flags:
+    """Claimed frames (T,) that are not judged and whose neighbours that are, are undeclared."""
+    found = np.zeros_like(undeclared)
+    for first, end in runs(~judged & claimed):
+        sides = [bool(undeclared[k]) for k in (first - 1, end) if 0 <= k < len(judged) and judged[k]]
+        found[first:end] = bool(sides) and all(sides)
     return found
 
 

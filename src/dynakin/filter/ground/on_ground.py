@@ -1,4 +1,4 @@
-"""Who stands where, by feet and plates that are in step."""
+"""Who stands where, by feet and plates, as the recording has them or in step."""
 
 from __future__ import annotations
 

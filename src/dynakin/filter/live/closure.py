@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.filter.ground.closure import EDGE, EXCESS
+from dynakin.filter.ground.load_ratio import AMPLITUDE
 from dynakin.filter.ground.mass_centre import CentreWeights
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.units import GRAVITY_M_S2
@@ -60,17 +61,18 @@ class LiveClosure:
         if short or 0.0 <= time_s - self._judged_s < _EVERY_S:
             return self.bears
         time = np.array([at for at, _, _ in self._kept])
-        excess = np.where(self._axes, self._excess(time), 0.0)
-        size = float(np.abs(excess).max()) / (self._mass * GRAVITY_M_S2)
-        self.bears, self._judged_s = size > (EDGE if self.bears else EXCESS), time_s
+        excess, acceleration = self._excess(time)
+        weight = self._mass * GRAVITY_M_S2
+        least = EDGE * weight if self.bears else EXCESS * weight + AMPLITUDE * self._mass * np.abs(acceleration)
+        self.bears, self._judged_s = bool((self._axes & (np.abs(excess) > least)).any()), time_s
         return self.bears
 
-    def _excess(self, time: Array) -> Array:
-        """(3,) N: what the motion needs less what the plates carry."""
+    def _excess(self, time: Array) -> tuple[Array, Array]:
+        """(3,) N: what the motion needs less what the plates carry; (3,) m/s^2 how the centre of mass accelerates."""
         half = 0.5 * (time[-1] - time[0])
         t = (time - time[0] - half) / half
         path, force = (np.stack([row[k] for row in self._kept]) for k in (1, 2))
         acceleration = 2.0 * np.polynomial.polynomial.polyfit(t, path, 2)[2] / half**2
         weights = (1.0 - t**2) ** 2
         need = self._mass * (acceleration + np.array([0.0, GRAVITY_M_S2, 0.0]))
-        return np.asarray(need - weights @ force / weights.sum())
+        return np.asarray(need - weights @ force / weights.sum()), np.asarray(acceleration)

@@ -22,7 +22,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.tree import Tree
 
 Array = npt.NDArray[np.float64]
-Hips = Literal["measured", "supposed", "proportions"]
+Hips = Literal["measured", "functional", "supposed", "proportions"]
 
 UNMARKED_SHARE = 0.09
 """Part of the mass that may be unmarked before it counts: head and hands, of which recordings often have no markers."""
@@ -85,8 +85,9 @@ class Provenance:
         one_sided_joints: knees and ankles with a lateral marker alone and no measured width: their centres lie half an
             adult's joint width inwards.
         moved_joints: knees and ankles whose markers sit otherwise in the standing trial than in the trial.
-        hips: where their centres come from: markers of the pelvis; supposed, where some of these are put where two
-            others or the other side have them, or sit otherwise in the trial; or proportions of an adult.
+        hips: where their centres come from: markers of the pelvis; functional trials; supposed, where some of these
+            markers are put where two others or the other side have them, or sit otherwise in the trial; or proportions
+            of an adult.
     """
 
     guessed_places: bool = False

@@ -118,7 +118,7 @@ class Pelvis:
                 of the hips sit otherwise in the trial.
         """
         if not _HIPS - {*functional}:
-            return "measured"
+            return "functional"
         if _HIPS & {*added}:
             return "supposed" if _framed(self.source) else "proportions"
         return "supposed" if moved or finder.markers_of("hip") & self.supposed.keys() else "measured"

@@ -119,8 +119,7 @@ def find_repetitions(paths: BodyPaths, window: npt.NDArray[np.bool_] | None = No
     kept = tuple(r for r in every if window is None or window[r.first : r.last + 1].all())
     if not kept:
         lacks = not np.isfinite(paths.pelvis).any()
-        why = "the recording has no pelvis markers" if lacks and kind == "squat" else "no pelvis or heel markers"
-        return Found(kind, (), f"No {what} was found{f': {why}' if lacks else ''}.")
+        return Found(kind, (), f"No {what} was found{': the recording has no pelvis markers' if lacks else ''}.")
     after = "" if window is None or window.all() else " after the adaptation"
     times = ", ".join(f"{r.start_s:.1f} to {r.end_s:.1f} s" for r in kept)
     return Found(kind, kept, f"{len(kept)} {what}{'' if len(kept) == 1 else 's'}{after}: {times}.")

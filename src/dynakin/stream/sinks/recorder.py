@@ -229,9 +229,9 @@ def finish(folder: str | Path, output: str | Path, given: Mapping[str, Any] | No
     """
     check_output_writable(Path(output))
     found = read_recorded(folder)
-    for key in ("static", "parameters"):
-        told = found.begun["settings"].get(key)
-        if told is not None and key not in (given or {}) and not Path(told).exists():
+    for key, told in found.begun["settings"].items():
+        file = Path(told) if isinstance(told, str) and key not in (given or {}) else Path()
+        if file.is_absolute() and not file.exists():
             raise ConfigError(f"{folder}: the session's {key}, {told}, is there no more, expected it, or --{key} FILE")
     settings = found.begun["settings"] | (given or {}) | {"trial": Path(folder), "output": Path(output)}
     case = case_of(Settings.of(settings, "live"), recording=_recording(found, folder))

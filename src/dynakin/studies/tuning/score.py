@@ -76,7 +76,7 @@ def figures_of(trial: TuningTrial, noise: Noise, declared: Noise) -> dict[str, A
 
 
 def figures_from(sums: Mapping[str, Any], trial: TuningTrial, declared: Noise) -> dict[str, Any]:
-    """`figures_of` what `run_score` gave."""
+    """`figures_of` what the core's `score` gave."""
     blank = dict.fromkeys([*CRITERIA, "n_rows", "log_likelihood", "nis_per_row", *_parts(""), *_parts("ahead_")])
     found = {"divergence": sums["divergence"] or None, "done": int(sums["done"])} | blank
     if sums["divergence"] or sums["n_rows"] == 0:
