@@ -26,6 +26,7 @@ DISMISS = """[...document.querySelectorAll('.mantine-Notification-closeButton')]
 
 
 def main() -> None:
+    """Write pictures of the page."""
     parser = argparse.ArgumentParser()
     parser.add_argument("url")
     parser.add_argument("--wait", type=float, default=20.0, help="s from opening the page to the picture")
@@ -78,6 +79,7 @@ class Page:
         self.socket, self.count = connect(url, max_size=None), 0
 
     def call(self, method: str, **parameters: object) -> dict:
+        """The browser's answer to one command."""
         self.count += 1
         self.socket.send(json.dumps({"id": self.count, "method": method, "params": parameters}))
         while True:
