@@ -37,7 +37,7 @@ def test_one_recording_does_not_replace_the_table_of_all(tmp_path: Path) -> None
     done = subprocess.run(command, env=environment, capture_output=True, encoding="utf-8", check=True)
     rows = [line for line in done.stdout.split("WRITTEN")[1].splitlines() if line.startswith("| `")]
     assert rows == [
-        "| `opencap_subject4/squats1` | 0.1 | 1.2 | 1.2 | – | 0.2 | 1, 1, 1, 1, 2 |",
-        "| `opencap_subject4/walking1` | 0.1 | 1.3 | 1.3 | – | 0.2 | 1, 1, 1, 1, 2 |",
+        "| `opencap_subject4/squats1` | 0.1 | 1.2 | 1.2 | – | 0.2 | 1, 1, 1, 1, 1, 2 |",
+        "| `opencap_subject4/walking1` | 0.1 | 1.3 | 1.3 | – | 0.2 | 1, 1, 1, 1, 1, 2 |",
         "| `opencap_subject4/STS1` | no markers | – | – | – | – | – |",
     ]

@@ -227,7 +227,7 @@ def doubtful_mass(initial: CalibratedModel, load_kg: float) -> Message | None:
     carried = ", or a load is carried (moments of back and arms are wrong by it)" if load_kg > mass_kg else ""
     return warning(
         "weight",
-        f"the plates carry about {load_kg:.1f} kg where the person weighs {mass_kg:.1f} kg "
+        f"the plates carry {load_kg:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
         f"({100.0 * abs(load_kg - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
         f"mass{carried}. Forces, moments and inertia take the error on.",
     )
