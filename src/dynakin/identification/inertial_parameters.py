@@ -18,7 +18,7 @@ cross-section with the table's radius of gyration, izz = m (|c|^2 + r0^2 exp(2 k
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -122,12 +122,12 @@ class InertialParameters:
         centre = np.array([body.centre for body in tables])
         spread = np.array([body.pseudo_inertia[:3, :3] / body.mass for body in tables])
         spread -= centre[:, :, None] * centre[:, None, :]
-        heavy = replace(initial, height_stated=True).heavy  # also by a height that was measured: a run may be told one
         worn, spines = initial.plan.worn_kg(known or Priors()) if initial.plan else {}, trunks_of(initial)
         return cls.in_space(
             names, total, mass, centre, _upper(spread), priors,
             worn_kg=np.array([worn.get(name, 0.0) for name in names]),
-            trunks=[] if initial.plan is None or heavy else [name in spines for name in names],
+            # a run may be told a height that was measured here
+            trunks=[] if initial.plan is None or initial.heavy_as_measured else [name in spines for name in names],
         )  # fmt: skip
 
     @classmethod

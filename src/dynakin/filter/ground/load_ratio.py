@@ -45,12 +45,11 @@ def load_ratio(
     window = min(window, max(end - first for first, end in runs(judged)))
     needed, had, whole = (window_means(np.where(judged, v, 0.0), window) for v in (need, have, judged.astype(float)))
     found = [frames]
-    vigorous = frames.left_open(weight) > LEFT_OPEN
     means = _Loads(needed, had, amplitude).carrying(whole > 1.0 - 1e-9, weight)
     if len(means.need):
         low, high = np.percentile(means.have / means.need, (2.0, 98.0))
         if high - low < apart:
-            found += [means] * vigorous
+            found += [means] * (frames.left_open(weight) > LEFT_OPEN)
         else:
             lower = frames.have < 0.5 * (low + high) * frames.need
             groups = [_Loads(frames.need[own], frames.have[own], amplitude) for own in (lower, ~lower) if own.any()]

@@ -164,8 +164,13 @@ class CalibratedModel(StartingState):
     @property
     def heavy(self) -> bool:
         """Whether the person is heavier for the height than those of the inertia tables: their trunk's centre of mass
-        is not this person's."""
-        if self.plan is None or self.height_m is None or not self.height_stated:
+        is not this person's. By a height that is somebody's word."""
+        return self.height_stated and self.heavy_as_measured
+
+    @property
+    def heavy_as_measured(self) -> bool:
+        """The same by any height, one that was estimated from markers too."""
+        if self.plan is None or self.height_m is None:
             return False
         return self.mass_kg > HEAVY_KG_M2 * self.height_m**2
 
@@ -210,7 +215,8 @@ class CalibratedModel(StartingState):
         `unmarked_feet`."""
         if not self.feet:
             return self.markers_of_fixed_feet
-        return {side: [] if side in self.unmarked_feet else own for side, own in self._on_feet().items()}
+        unmarked = self.unmarked_feet
+        return {side: [] if side in unmarked else own for side, own in self._on_feet().items()}
 
     def _on_feet(self) -> dict[str, list[str]]:
         tree, pairs = self.tree, list(zip(self.recorded_markers, self.spec.markers, strict=True))
