@@ -17,6 +17,7 @@ from itertools import repeat
 import numpy as np
 
 import dynakin
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_names
@@ -105,11 +106,12 @@ def one_trial(model: str, seed: int, duration: float, changes: dict[str, float])
         tracker = estimator.start(off_by(estimator.start(trial.recording).calibrated, seed))
         initial = tracker.calibrated
         names = tuple(free_names(initial.spec))
-        measured = marker_paths(trial.recording, initial), total_wrench(trial.recording, initial)
-        arrays = tracker.run_arrays(trial.recording.time, *measured)
+        markers, wrench = marker_paths(trial.recording, initial), total_wrench(trial.recording, initial)
+        measured = Measurements(trial.recording.time, markers, wrench)
+        arrays = tracker.run_arrays(measured)
         found.append(figures(name, blocks(arrays, initial), trial, names))
         if name == "default":
-            arrays = tracker.fresh().run_smoothed_arrays(trial.recording.time, *measured)
+            arrays = tracker.fresh().run_smoothed_arrays(measured)
             found.append(figures("default, smoothed", blocks(arrays, initial), trial, names))
     at = reference_methods(trial.recording, initial, definition).data.sel(coordinate=list(names))
     given = {

@@ -32,9 +32,8 @@ def work() -> None:
         recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 3.0)
         subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     ready = dynakin.Estimator(dynakin.load_model("fullbody", subject=subject)).prepare(recording, lag_s=0.0)
-    measured = (recording.time, ready.markers, ready.wrench)
     for _ in sys.stdin:
-        arrays = ready.tracker.fresh().run_smoothed_arrays(*measured, None, ready.contacts)
+        arrays = ready.tracker.fresh().run_smoothed_arrays(ready.measured)
         print(json.dumps([arrays["step_us"].tolist(), arrays["backward_us"].tolist()]), flush=True)
 
 

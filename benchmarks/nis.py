@@ -19,7 +19,7 @@ import numpy as np
 from pages import put
 
 from dynakin.errors import DynakinError
-from dynakin.filter.adapt import Flags, Samples, calibrated_noise, nis_per_row
+from dynakin.filter.adapt import Flags, calibrated_noise, nis_per_row
 from dynakin.filter.alignment import run_in_step
 from dynakin.filter.tracker import Tracker
 from dynakin.settings.noise import JointGroup
@@ -92,17 +92,14 @@ def figures(trial: Known, wanted: str) -> dict[str, Any]:
     case = case_of(Settings.of(keys, "nis"))
     recording = case.recording.window(float(case.recording.time[0]), float(case.recording.time[0]) + LONGEST_S)
     ready = case.setup.estimator("default").prepare(recording, static=case.static)
-    tracker, arrays, shift, _ = run_in_step(
-        ready.tracker.fresh(), recording.time, ready.markers, ready.wrench, None, ready.contacts
-    )
-    contacts = ready.contacts and ready.contacts.in_step(recording.time, shift)
-    run = Samples(recording.time, ready.markers, ready.wrench, contacts)
+    tracker, arrays, shift, _ = run_in_step(ready.tracker.fresh(), ready.measured)
+    run = ready.measured.in_step(shift)
     chosen = halves(run.time)
     noise = calibrated_noise(tracker, arrays, run, chosen)
     if noise is None:
         return {"declared": nis_per_row(arrays, ~chosen), "calibrated": None, "markers": None, "plates": None,
                 "variance_scale": None, "jerk_scale": {}}  # fmt: skip
-    again = tracker.changed(noise).run_arrays(*run[:3], None, run.contacts)
+    again = tracker.changed(noise).run_arrays(run)
     held = ~chosen
     return {
         "declared": nis_per_row(arrays, held),

@@ -22,6 +22,7 @@ from peers_times import times
 import dynakin
 from dynakin.arrays import rms, wrench_about
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.model.definition import Definition, load_model
 from dynakin.model.opensim.definition import load_opensim
@@ -74,7 +75,7 @@ def filtered(estimate: tuple[str, ...], *, smooth: bool = False) -> tuple[float,
     wrench = total_wrench(recording, tracker.calibrated, gaps=True)
     wrench[:] = np.nan
     run = tracker.run_smoothed_arrays if smooth else tracker.run_arrays
-    return distance_mm(markers, run(recording.time, markers, wrench)["markers_estimated"]), markers
+    return distance_mm(markers, run(Measurements(recording.time, markers, wrench))["markers_estimated"]), markers
 
 
 def fit(peer: Kinematics) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from opensim_peer import inverse_kinematics, load, without_patellae
 
 import dynakin
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.settings.subject import Subject
@@ -33,7 +34,7 @@ def steps(file: Path, data: Path, mass: float, kinds: tuple[str, ...], plates: b
         wrench[:] = np.nan
     found = []
     for _ in range(2):
-        found.append(tracker.fresh().run_arrays(recording.time, markers, wrench)["step_us"])
+        found.append(tracker.fresh().run_arrays(Measurements(recording.time, markers, wrench))["step_us"])
     return f"{len(initial.names)} states", np.concatenate(found)
 
 

@@ -27,6 +27,7 @@ from pathlib import Path
 import numpy as np
 
 import dynakin
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import load_model
 from dynakin.recordings.recording import Recording
@@ -113,26 +114,27 @@ def of_frames(model: str, frames: int, how: str) -> dict[str, float]:
     if how == "live":
         steps(tracker, data)
     else:
-        tracker.run_smoothed_arrays(*data)
+        tracker.run_smoothed_arrays(data)
     took = time.process_time() - began
     return {"s": took, "ms": 1e3 * took / frames, "mb": peak_mb()}
 
 
-def steps(tracker: Tracker, data: tuple[Array, Array, Array]) -> None:
+def steps(tracker: Tracker, data: Measurements) -> None:
     """One by one, in the core."""
-    at, markers, wrench = data
+    at, markers, wrench, _ = data
     for k in range(len(at)):
         tracker._filter.step(at[k] - at[k - 1] if k else 0.0, markers[k], wrench[k])
 
 
-def repeated(recording: Recording, definition: object, frames: int) -> tuple[Tracker, tuple[Array, Array, Array]]:
+def repeated(recording: Recording, definition: object, frames: int) -> tuple[Tracker, Measurements]:
     """Of a recording that is played forwards and backwards in turn; the first frames are the calibration's."""
     ready = dynakin.Estimator(definition).prepare(recording)
     count, dt = recording.n_frames, 1.0 / recording.rate
     there_and_back = np.concatenate([np.arange(count), np.arange(count - 2, 0, -1)])
     chosen = np.resize(there_and_back, frames)
     tracker = ready.tracker.fresh()
-    return tracker, (np.arange(frames) * dt, ready.markers[chosen], ready.wrench[chosen])
+    measured = ready.measured
+    return tracker, Measurements(np.arange(frames) * dt, measured.markers[chosen], measured.wrench[chosen])
 
 
 def planar() -> tuple[Recording, object]:
@@ -172,7 +174,7 @@ def of_states(model: str, extra: int | None) -> dict[str, float]:
     """Medians of a step and of what smoothing adds, ms, with so many further markers on thighs and shanks."""
     recording, definition = planar() if model == "planar" else with_markers(extra)
     tracker, data = repeated(recording, definition, TIMED)
-    arrays = tracker.run_smoothed_arrays(*data)
+    arrays = tracker.run_smoothed_arrays(data)
     return {
         "markers": len(tracker.calibrated.recorded_markers),
         "states": tracker.core_model.layout.size,

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 import dynakin
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.core_filter import filter_settings
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import Definition
@@ -51,8 +52,7 @@ def smoothing(title: str, model: Definition, recording: dynakin.Recording) -> No
     """Medians over rounds in turn, so that a busy machine is as busy for all: a step, what smoothing adds to it, its
     bare products, steps with a lag, and whole runs with a lag, which have deviations in each frame."""
     ready = dynakin.Estimator(model).prepare(recording)
-    start, frames = ready.tracker, slice(0, SMOOTHED)
-    data = (recording.time[frames], ready.markers[frames], ready.wrench[frames])
+    start, data = ready.tracker, ready.measured.first(SMOOTHED)._replace(contacts=None)
     blocks = {name: size for name, (_, size) in start.core_model.layout.blocks.items()}
     constants = sum(blocks.get(name, 0) for name in CONSTANTS)
     moving = sum(blocks.values()) - constants
@@ -64,7 +64,7 @@ def smoothing(title: str, model: Definition, recording: dynakin.Recording) -> No
     for _ in range(ROUNDS):
         for threads, name in (("1", "smoothing adds"), ("2", "smoothing adds, 2 threads")):
             os.environ["OMP_NUM_THREADS"] = threads
-            arrays = start.fresh().run_smoothed_arrays(*data)
+            arrays = start.fresh().run_smoothed_arrays(data)
             note("step", arrays["step_us"])
             note(name, arrays["backward_us"])
         rows = int(np.median(arrays["n_rows"]))
@@ -72,9 +72,8 @@ def smoothing(title: str, model: Definition, recording: dynakin.Recording) -> No
         for lag in LAGS:
             late = Tracker(start.calibrated, start.noise, start.estimate, lag)
             note(f"step, lag {lag}", [one_step(late, data, k) for k in range(LAGGED)][lag + 1 :])
-            few = [values[:LAGGED] for values in data]
             before = process_time()
-            start.fresh().run_late_arrays(lag, *few)
+            start.fresh().run_late_arrays(lag, data.first(LAGGED))
             note(f"run, lag {lag}, deviations", [1e6 * (process_time() - before) / LAGGED])
         plain = start.fresh()
         note("step, no lag", [one_step(plain, data, k) for k in range(LAGGED)])
@@ -84,9 +83,9 @@ def smoothing(title: str, model: Definition, recording: dynakin.Recording) -> No
         print(f"  {name:25} {np.median(us):8.0f} us, {np.median(us) / step:5.2f} steps")
 
 
-def one_step(tracker: Tracker, data: tuple[Array, Array, Array], k: int) -> float:
+def one_step(tracker: Tracker, data: Measurements, k: int) -> float:
     """Microseconds of the core's step alone."""
-    time, markers, wrench = data
+    time, markers, wrench, _ = data
     core = tracker._filter if tracker._lag is None else tracker._lag
     dt = time[k] - time[k - 1] if k else 0.0
     before = perf_counter()

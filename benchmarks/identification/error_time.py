@@ -58,7 +58,7 @@ def main() -> None:
             trial = measure_all(common, [gestured])
             folds += [(f"gestures -> {task}", trial, k) for k, task in enumerate(tasks)]
         for label, chosen, k in folds:
-            raw = common.with_plates(trials[k].movement, sims[k].recording, as_measured=True)
+            raw = common.with_plates(trials[k].movement, sims[k].recording).full_band()
             found = {"table": (inertial.phi(start), start)}
             for least in LEAST_S:
                 batch.LEAST_TAU_S = least

@@ -163,7 +163,7 @@ def verify(
     told &= after > 1e-6 * before  # all but the total mass
     errors.append((np.abs(K @ (protocol.phi - phi["true inertia"])) / np.where(told, after, 1.0))[told])
     seen = common.see(walking.recording)
-    raw = common.with_plates(seen, walking.recording, as_measured=True)
+    raw = common.with_plates(seen, walking.recording).full_band()
     for name, values in phi.items():
         off = (K @ (values - phi["true inertia"]) / np.where(told, before, 1.0))[told]
         rows.setdefault(("base parameters from truth, prior sds, RMS:", name), []).append(

@@ -23,6 +23,7 @@ from simulated import judged
 import dynakin
 from dynakin.arrays import wrench_about
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import marker_paths
 from dynakin.identification.subject import identify_subject
 from dynakin.identification.trials import Common, MeasuredTrial, Movement
@@ -47,8 +48,8 @@ def product(
     tracker = estimator.start(recording, static=static)
     initial = tracker.calibrated
     markers = marker_paths(recording, initial, lacking=True)
-    arrays = tracker.run_smoothed_arrays(recording.time, markers, np.full((recording.n_frames, 6), np.nan))
-    return arrays["wrench_estimated"]
+    measured = Measurements(recording.time, markers, np.full((recording.n_frames, 6), np.nan))
+    return tracker.run_smoothed_arrays(measured)["wrench_estimated"]
 
 
 def of_movement(movement: Movement, recording: Recording, wrench: Array) -> Array:
@@ -70,7 +71,7 @@ def compare(
     common = Common.measure(Estimator(model), chosen[0], static)
     trials = [common.measured(recording) for recording in chosen]
     seen = common.see(judging)
-    raw = common.with_plates(seen, judging, as_measured=True)
+    raw = common.with_plates(seen, judging).full_band()
     judge = judged_walking if walks else judged
     components = ", ".join(COMPONENTS[k] for k in common.rows)
     print(f"\n{' + '.join(r.name for r in chosen)} -> {judging.name}: RMS {components} (N, N m)")

@@ -66,7 +66,7 @@ def one(model: str, seed: int, duration_s: float, filters: tuple[str, ...]) -> d
         others = [j for j in range(len(trials)) if j != k]
         candidates = all_candidates(common, [trials[j] for j in others], [sims[j].recording for j in others], filters)
         candidates |= {"true inertia": (true, None)}
-        raw = common.with_plates(trials[k].movement, sims[k].recording, as_measured=True)
+        raw = common.with_plates(trials[k].movement, sims[k].recording).full_band()
         for name, (phi, geometry) in candidates.items():
             wrench = predicted(common, trials[k].movement.states, phi, geometry)
             found[task, name] = judged(common, raw, wrench, SKIPPED_S.get(task, SKIPPED_ELSE_S))

@@ -31,7 +31,7 @@ markers = {"markers": "opencap"} if kind == "sagittal7" else {}
 ready = dynakin.Estimator(dynakin.load_model(kind, subject=subject, **markers)).prepare(recording, lag_s=0.0)
 for how in ("run_arrays", "run_smoothed_arrays"):
     run = getattr(ready.tracker.fresh(), how)
-    arrays = run(recording.time, ready.markers, ready.wrench, None, ready.contacts)
+    arrays = run(ready.measured)
     found = {name: arrays[name] for name in ("state", "state_sd", "moments", "moments_sd")}
     np.savez(f"{out}/{how}.npz", level=bindings.level, **found)
 """

@@ -32,7 +32,7 @@ def ready() -> dict[str, Prepared]:
 def smoothed(ready: dict[str, Prepared], name: str) -> dict[str, np.ndarray]:
     one = ready[name]
     run = one.tracker.fresh().run_smoothed_arrays
-    return run(one.recording.time, one.markers, one.wrench, None, one.contacts)
+    return run(one.measured)
 
 
 def by_executor(ready: dict[str, Prepared], threads: int) -> dict[str, dict[str, np.ndarray]]:
@@ -53,7 +53,7 @@ def test_the_second_thread_of_a_step_changes_no_bit(ready, monkeypatch):
     assert one.tracker.calibrated.x0.size > 200
     for threads in ("1", "2"):
         monkeypatch.setenv("OMP_NUM_THREADS", threads)
-        live = one.tracker.fresh().run_arrays(one.recording.time, one.markers, one.wrench, None, one.contacts)
+        live = one.tracker.fresh().run_arrays(one.measured)
         found.append(smoothed(ready, "fullbody 1") | {f"live_{key}": value for key, value in live.items()})
     for array in found[0].keys() - TIMES - {f"live_{key}" for key in TIMES}:
         assert found[0][array].tobytes() == found[1][array].tobytes(), array

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.filter.adapt import LATE_SHARE, LEAST_FRAMES, Samples, calibrated_noise, frames_that_show, nis_per_row
+from dynakin.filter.adapt import LATE_SHARE, LEAST_FRAMES, calibrated_noise, frames_that_show, nis_per_row
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.noise import joint_groups
@@ -39,11 +39,11 @@ def planar(noise: Noise) -> Estimator:
 
 def found(ready: Prepared, frames: np.ndarray | None = None) -> tuple[Noise, dict[str, np.ndarray]]:
     tracker = ready.tracker.fresh()
-    trial = Samples(ready.recording.time, ready.markers, ready.wrench, ready.contacts)
-    arrays = tracker.run_arrays(*trial[:3], None, trial.contacts)
+    trial = ready.measured
+    arrays = tracker.run_arrays(trial)
     noise = calibrated_noise(tracker, arrays, trial, frames)
     assert noise is not None
-    return noise, tracker.changed(noise).run_arrays(*trial[:3], None, trial.contacts)
+    return noise, tracker.changed(noise).run_arrays(trial)
 
 
 def test_the_scale_of_all_variances_leaves_the_movement_alone() -> None:
@@ -83,7 +83,7 @@ def walk() -> Prepared:
 def test_it_holds_on_frames_that_it_has_not_seen(walk: Prepared) -> None:
     seen = np.floor(walk.recording.time / 0.3) % 2 == 0
     noise, arrays = found(walk, seen)
-    declared = walk.tracker.fresh().run_arrays(walk.recording.time, walk.markers, walk.wrench, None, walk.contacts)
+    declared = walk.tracker.fresh().run_arrays(walk.measured)
     before, after = nis_per_row(declared, ~seen), nis_per_row(arrays, ~seen)
     assert before is not None and after is not None
     assert before < 0.5 and 0.7 < after < 1.3
@@ -160,8 +160,8 @@ def test_frames_in_which_limbs_are_astray_say_nothing_of_the_noise() -> None:
     """More than a third of the markers refused is a lost frame: of some the rest is as before, of most nothing is."""
     ready = planar(Noise()).prepare(standing(0.001))
     tracker = ready.tracker.fresh()
-    trial = Samples(ready.recording.time, ready.markers, ready.wrench, ready.contacts)
-    arrays = tracker.run_arrays(*trial[:3], None, trial.contacts)
+    trial = ready.measured
+    arrays = tracker.run_arrays(trial)
     for share, kept in ((0.3, True), (0.7, False)):
         astray = np.arange(len(trial.time)) >= (1.0 - share) * len(trial.time)
         verdicts, nis = arrays["verdicts"].copy(), arrays["nis"].copy()

@@ -253,7 +253,7 @@ def test_the_one_plate_that_no_foot_can_own_is_the_one_contacts_that_is_declared
     one, other = (each.ground.loads for each in (given, found))
     assert one is not None and other is not None and other.given == one.given == {2: ("seat",)}
     np.testing.assert_array_equal(other.others["seat"], one.others["seat"])
-    np.testing.assert_array_equal(found.wrench, given.wrench)
+    np.testing.assert_array_equal(found.measured.wrench, given.measured.wrench)
 
 
 def test_a_foots_plate_is_not_taken_for_the_seats() -> None:

@@ -9,6 +9,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.messages import about
 from dynakin.pipeline.result import Result
@@ -121,7 +122,7 @@ def test_the_delayed_frame_is_the_smoothers_of_what_was_seen(trial: SimulatedTri
     offline = estimator().start(trial.recording)
     markers = marker_paths(trial.recording, offline.calibrated)
     wrench = total_wrench(trial.recording, offline.calibrated)
-    arrays = offline.run_smoothed_arrays(trial.recording.time[:120], markers[:120], wrench[:120])
+    arrays = offline.run_smoothed_arrays(Measurements(trial.recording.time, markers, wrench).first(120))
     np.testing.assert_allclose(delayed.speeds, arrays["state"][104, 7:14], atol=1e-8)
     with pytest.raises(ConfigError, match=r"expected Estimator\.start\(\.\.\., lag_s=SECONDS\)"):
         offline.delayed()

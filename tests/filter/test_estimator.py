@@ -13,6 +13,7 @@ import xarray as xr
 import dynakin
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
+from dynakin.filter.measurements import Measurements
 from dynakin.pipeline.result import Result
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import DERIVED, MEASURED, wrench_sources
@@ -203,7 +204,7 @@ def test_a_marker_far_beyond_all_numbers_is_divergence_at_its_frame(trial: Simul
     markers, wrench, _ = filtering.measured(trial.recording, tracker.calibrated)
     markers[250, tracker.calibrated.recorded_markers.index("r_knee")] = 1e200
     with pytest.raises(DivergenceError, match=r"diverged at frame 250 \(2\.500000 s\)"):
-        tracker.run_arrays(trial.recording.time, markers, wrench)
+        tracker.run_arrays(Measurements(trial.recording.time, markers, wrench))
     gated = estimator().run(with_markers(trial.recording, broken))
     assert [(e.kind, e.frame) for e in gated.events if e.subject == "r_knee"] == [("gated", 250)]
 

@@ -15,6 +15,7 @@ from dynakin.filter.ground.expected import (
     PIVOT_M,
     SHEAR_SD,
     UNDECLARED_SD,
+    Bearing,
     expected_loads,
     foot_prior,
     plate_errors,
@@ -97,7 +98,8 @@ def expected(loads: FootLoads, undeclared: np.ndarray | None = None, **noise: fl
     n = len(loads.reason)
     asked = np.zeros(n, bool) if undeclared is None else undeclared
     chosen = NOISE.model_copy(update=noise) if noise else NOISE
-    return expected_loads(loads, person(), chosen, np.tile(ROOT, (n, 1, 1)), asked, np.zeros((n, 0), bool))
+    bearing = Bearing(loads, asked, np.zeros((n, 0), bool))
+    return expected_loads(bearing, person(), chosen, np.tile(ROOT, (n, 1, 1)))
 
 
 def drawn_prior(seed: int, frame: int = 1, foot: int = 1) -> np.ndarray:
@@ -241,10 +243,8 @@ def test_a_plate_of_the_vertical_force_alone_leaves_the_rest_to_the_prior() -> N
     place = PRESSURE[0] + [0.02, 0.0, -0.01]
     loads.wrench[t, 0] = plate_wrench(410.0, place, (0.0, 0.0)) - [0.0, 0.0, 0.0, 0.0, 2.0, 0.0]
     n = len(REASONS)
-    found = expected_loads(
-        loads, person(), NOISE, np.tile(ROOT, (n, 1, 1)), np.zeros(n, bool), np.zeros((n, 0), bool),
-        Shear(unmeasured=True),
-    )  # fmt: skip
+    bearing = Bearing(loads, np.zeros(n, bool), np.zeros((n, 0), bool), Shear(unmeasured=True))
+    found = expected_loads(bearing, person(), NOISE, np.tile(ROOT, (n, 1, 1)))
     assert found.contact[t].tolist()[:2] == [UNMEASURED, UNMEASURED]
     prior = foot_prior(loads, 0, WEIGHT, np.tile(ROOT, (n, 1)), np.zeros(n, bool))
     P, there = prior.spread[t] @ prior.spread[t].T, carry(-place)

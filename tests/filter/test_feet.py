@@ -16,6 +16,7 @@ from dynakin.errors import ModelError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.core_filter import smoothed
+from dynakin.filter.measurements import Measurements
 from dynakin.model.calibration.calibrated import Provenance
 from dynakin.pipeline.result import Result
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
@@ -86,6 +87,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
         contacts={},
         held={},
         provenance=Provenance(),
+        joint_prior=None,
         unmarked_feet={},
         coupled=None,
         in_radians=frozenset(),
@@ -103,9 +105,10 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
         height_m=None,
         messages=(),
     )
-    measured = (data.markers, data.wrench)
-    covariances = (data.P0, core.covariance)
-    return assemble(arrays, _core.Model(spec), initial, recording, measured, {}, [], covariances, Noise(), feet)
+    tracker: Any = SimpleNamespace(
+        calibrated=initial, core_model=_core.Model(spec), noise=Noise(), covariance=core.covariance
+    )
+    return assemble(arrays, tracker, recording, Measurements(data.time, data.markers, data.wrench, feet), {}, [])
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,8 @@ import pytest
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.ground.expected import ContactPaths, expected_loads
+from dynakin.filter.ground.expected import Bearing, ContactPaths, expected_loads
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import Sample, marker_paths, total_wrench
 from dynakin.filter.sources import ContactSources
 from dynakin.filter.tracker import Tracker
@@ -30,14 +31,15 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
     model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
     live = Estimator(model, presets.default().changed(systematic_scale=0.0)).start(recording, lag_s=0.04)
     initial = live.calibrated
-    markers, wrench = marker_paths(recording, initial), total_wrench(recording, initial)
     feet = _feet(recording, live)
+    markers, wrench = marker_paths(recording, initial), total_wrench(recording, initial)
+    measured = Measurements(recording.time, markers, wrench, feet)
     for sample, part in zip(_samples(recording), _frames(feet), strict=True):
         now = live.step(sample, part)
-    arrays = Estimator(model).start(initial).run_arrays(recording.time, markers, wrench, feet=feet)
+    arrays = Estimator(model).start(initial).run_arrays(measured)
     np.testing.assert_allclose(now.moments, arrays["moments"][-1], atol=1e-6)
     np.testing.assert_allclose(live.deviations()["moments"], arrays["moments_sd"][-1], rtol=1e-6, atol=1e-9)
-    smoothed = Estimator(model).start(initial).run_smoothed_arrays(recording.time, markers, wrench, feet=feet)
+    smoothed = Estimator(model).start(initial).run_smoothed_arrays(measured)
     delayed = live.delayed()
     assert delayed is not None and np.abs(delayed.moments[6:]).max() > 30.0
     np.testing.assert_allclose(delayed.moments, smoothed["moments"][-5], atol=1e-5)
@@ -187,7 +189,8 @@ def _feet(recording: Recording, live: Tracker) -> ContactLoads:
     initial, markers = live.calibrated, marker_paths(recording, live.calibrated)
     loads = foot_loads(recording, initial.ground, initial.foot_markers)
     paths, nothing = ContactPaths.of(initial).at(markers), np.zeros((len(markers), 0), bool)
-    return expected_loads(loads, initial, live.noise, paths, np.zeros(len(markers), bool), nothing)
+    bearing = Bearing(loads, np.zeros(len(markers), bool), nothing)
+    return expected_loads(bearing, initial, live.noise, paths)
 
 
 def _frames(feet: ContactLoads) -> Iterator[ContactLoads]:

@@ -20,7 +20,7 @@ from support.plates import person, prepared, trial
 
 def delay_of(recording: Recording, ready: Prepared) -> Delay | None:
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
-    known = np.isfinite(ready.wrench).all(axis=1, keepdims=True)
+    known = np.isfinite(ready.measured.wrench).all(axis=1, keepdims=True)
     return clock_delay(ready.calibrated, recording.time, markers, np.where(known, wrench, np.nan))
 
 
@@ -54,7 +54,7 @@ def test_frames_that_show_too_little_are_left_out_and_the_rest_is_asked() -> Non
     ready, recording = prepared("gait"), trial("gait")
     late = brought_into_step(recording, Delay(-0.01, 0.0))
     gaps = late.markers.copy()
-    known = np.flatnonzero(np.isfinite(ready.wrench).all(axis=1))
+    known = np.flatnonzero(np.isfinite(ready.measured.wrench).all(axis=1))
     gaps[known[len(known) // 8], 2:] = np.nan
     whole, with_gaps = delay_of(late, ready), delay_of(replace(late, markers=gaps), ready)
     assert whole is not None and with_gaps is not None
@@ -99,9 +99,9 @@ def test_a_clock_that_is_faster_or_slower_is_found_and_plates_are_brought_into_s
     assert said.level == "warning" and ("faster" if drift > 0.0 else "slower") in said.text
     assert float(said.text.split("clock is ")[1].split()[0]) == pytest.approx(100.0 * abs(drift), abs=0.4)
     assert abs(ready.ground.behind_s) < 0.006
-    both = np.isfinite(ready.wrench).all(axis=1) & np.isfinite(before.wrench).all(axis=1)
-    assert both.sum() > 0.8 * np.isfinite(before.wrench).all(axis=1).sum()
-    assert np.abs(ready.wrench[both] - before.wrench[both])[:, :3].mean() < 3.0
+    both = np.isfinite(ready.measured.wrench).all(axis=1) & np.isfinite(before.measured.wrench).all(axis=1)
+    assert both.sum() > 0.8 * np.isfinite(before.measured.wrench).all(axis=1).sum()
+    assert np.abs(ready.measured.wrench[both] - before.measured.wrench[both])[:, :3].mean() < 3.0
 
 
 def with_a_clock_of_its_own(recording: Recording, which: int, late_s: float) -> Recording:
@@ -122,9 +122,9 @@ def test_one_plate_with_a_clock_of_its_own_is_named_and_brought_into_step() -> N
     assert said.level == "warning" and "plate 2 is" in said.text and said.text.count("the others") == 1
     assert float(said.text.split("plate 2 is ")[1].split()[0]) == pytest.approx(20.0, abs=3.0)
     assert not about(ready.messages, "rate") and abs(ready.ground.behind_s) < 0.004
-    both = np.isfinite(ready.wrench).all(axis=1) & np.isfinite(before.wrench).all(axis=1)
-    assert both.sum() > 0.8 * np.isfinite(before.wrench).all(axis=1).sum()
-    assert np.abs(ready.wrench[both] - before.wrench[both])[:, :3].mean() < 3.0
+    both = np.isfinite(ready.measured.wrench).all(axis=1) & np.isfinite(before.measured.wrench).all(axis=1)
+    assert both.sum() > 0.8 * np.isfinite(before.measured.wrench).all(axis=1).sum()
+    assert np.abs(ready.measured.wrench[both] - before.measured.wrench[both])[:, :3].mean() < 3.0
 
 
 def test_a_real_plate_with_a_clock_of_its_own_is_named(data_dir: Path) -> None:
@@ -147,7 +147,7 @@ def test_a_real_squat_shows_a_clock_that_drifts_and_none_that_does_not(data_dir:
 def test_no_drift_is_asked_for_where_a_load_that_moves_looks_like_one() -> None:
     ready, recording = prepared("gait"), drifting(trial("gait"), 0.03)
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
-    known = np.where(np.isfinite(ready.wrench).all(axis=1, keepdims=True), wrench, np.nan)
+    known = np.where(np.isfinite(ready.measured.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     asked, not_asked = (
         clock_delay(ready.calibrated, recording.time, markers, known, drifts) for drifts in (True, False)
     )
@@ -158,7 +158,7 @@ def test_who_lands_shows_no_few_milliseconds() -> None:
     """Flesh follows later than bones."""
     ready, recording = prepared("gait"), trial("gait")
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
-    wrench = np.where(np.isfinite(ready.wrench).all(axis=1, keepdims=True), wrench, np.nan)
+    wrench = np.where(np.isfinite(ready.measured.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     known = np.flatnonzero(np.isfinite(wrench[:, 1]))
     wrench[known[-1], 1] = 2.5 * 70.0 * 9.81
     assert clock_delay(ready.calibrated, recording.time, markers, wrench) is None
@@ -170,7 +170,7 @@ def test_short_gaps_hide_no_delay() -> None:
     whole = delay_of(recording, ready)
     assert whole is not None
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
-    wrench = np.where(np.isfinite(ready.wrench).all(axis=1, keepdims=True), wrench, np.nan)
+    wrench = np.where(np.isfinite(ready.measured.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     gap = np.isin(np.arange(recording.n_frames) % 60, [40, 41, 42])
     blank = np.where(gap[:, None, None], np.nan, markers), np.where(gap[:, None], np.nan, wrench)
     found = clock_delay(ready.calibrated, recording.time, *blank)

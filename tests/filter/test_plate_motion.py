@@ -54,16 +54,19 @@ def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: f
     side = "behind" if delay_s > 0.0 else "ahead of"
     (found,) = re.findall(rf"([0-9.]+) ms {side} the markers", text)
     assert float(found) == pytest.approx(1000.0 * abs(delay_s), abs=2.0)
-    both = np.isfinite(ready.wrench).all(axis=1) & np.isfinite(before.wrench).all(axis=1)
-    assert both.sum() > 0.8 * np.isfinite(before.wrench).all(axis=1).sum()
-    assert np.abs(ready.wrench[both] - before.wrench[both])[:, :3].mean() < 2.0
+    both = np.isfinite(ready.measured.wrench).all(axis=1) & np.isfinite(before.measured.wrench).all(axis=1)
+    assert both.sum() > 0.8 * np.isfinite(before.measured.wrench).all(axis=1).sum()
+    assert np.abs(ready.measured.wrench[both] - before.measured.wrench[both])[:, :3].mean() < 2.0
 
 
 def test_plates_that_are_in_step_are_left_alone(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
     walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
     for recording, ready in ((trial("gait"), prepared("gait")), (walk, person().prepare(walk))):
-        assert plates_delay(Needed(ready.calibrated, recording.time, ready.markers), ready.wrench[:, :3]) is None
+        assert (
+            plates_delay(Needed(ready.calibrated, recording.time, ready.measured.markers), ready.measured.wrench[:, :3])
+            is None
+        )
         assert bool(about(ready.messages, "in step")) == (recording is walk)  # 5 ms, as others of this laboratory
 
 
@@ -328,7 +331,8 @@ def test_plates_that_were_not_zeroed_in_shear_are_told_and_deviations_hold_it(ea
     assert len(said) == (each_n > 10.0) and not whole.ground.shear.notes
     assert not about(warnings_of(ready.messages), "weight")
     assert ready.ground.loads is not None and ready.ground.loads.total_known.all()
-    sd = [np.sqrt(each.contacts.covariance[100, 0, 0]) for each in (whole, ready) if each.contacts is not None]
+    contacts = (whole.measured.contacts, ready.measured.contacts)
+    sd = [np.sqrt(each.covariance[100, 0, 0]) for each in contacts if each is not None]
     if said:
         assert f"by {2.0 * each_n:.0f} N" in said[0] or f"by {2.0 * each_n + 1.0:.0f} N" in said[0]
         assert sd[1] == pytest.approx(2.0 * each_n, rel=0.1)
@@ -453,7 +457,7 @@ def test_forces_in_a_unit_that_makes_them_next_to_nothing_are_not_used_and_the_u
     walk = trial("gait")
     ready = person().prepare(with_forces(walk, lambda force: force / one))
     assert any("carry nobody" in text and f"in {unit}, not N" in text for text in map(str, ready.messages))
-    assert not np.isfinite(ready.wrench).any()
+    assert not np.isfinite(ready.measured.wrench).any()
 
 
 def test_another_unit_of_the_forces_of_a_squat_is_named() -> None:
@@ -486,7 +490,7 @@ def test_a_seat_that_nobody_declared_is_no_zero_of_the_plates(data_dir: Path) ->
     chair = dynakin.read(folder / "STS1.trc", folder / "STS1_grf.mot")
     ready = Estimator(load_model("fullbody", Subject(mass_kg=61.0))).prepare(chair)
     assert not about(ready.messages, "zero") and ready.ground.shear == NO_SHEAR
-    assert np.isfinite(ready.wrench).all(axis=1).sum() > 700
+    assert np.isfinite(ready.measured.wrench).all(axis=1).sum() > 700
 
 
 UPPER = ("Sternum", "C7", "Shoulder", "humerus", "elbow", "forearm", "wrist")
@@ -528,9 +532,9 @@ def test_a_pelvis_that_nobody_sees_says_nothing_of_the_plates() -> None:
     recording = simulate("fullbody", "squat", 3, 6.0).recording
     ready = person().prepare(recording)
     root = [k for k, marker in enumerate(ready.calibrated.spec.markers) if marker.segment == "pelvis"]
-    whole = Needed(ready.calibrated, recording.time, ready.markers).known
+    whole = Needed(ready.calibrated, recording.time, ready.measured.markers).known
     for frames, said in ((slice(200, 210), True), (slice(200, 260), False)):
-        markers = ready.markers.copy()
+        markers = ready.measured.markers.copy()
         markers[frames, root] = np.nan
         known = Needed(ready.calibrated, recording.time, markers).known
         assert whole[frames].all() and known[frames].all() == said and known[frames].any() == said

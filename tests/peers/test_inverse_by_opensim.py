@@ -41,7 +41,7 @@ def ready(folder: Path) -> Prepared:
 
 @pytest.fixture(scope="module")
 def motion(ready: Prepared) -> RigidMotion:
-    return rigid_motions(ready.calibrated, ready.recording.time, ready.markers, (6.0,))[6.0]
+    return rigid_motions(ready.calibrated, ready.recording.time, ready.measured.markers, (6.0,))[6.0]
 
 
 def posed(folder: Path, ready: Prepared, names: list[str], frames: int) -> np.ndarray:
@@ -64,7 +64,7 @@ def posed(folder: Path, ready: Prepared, names: list[str], frames: int) -> np.nd
 
 def test_angles_are_opensims(folder: Path, ready: Prepared, motion: RigidMotion) -> None:
     names = free_names(motion.model.spec)
-    ours = inverse_kinematics(ready.calibrated, ready.markers[:25])
+    ours = inverse_kinematics(ready.calibrated, ready.measured.markers[:25])
     away = np.abs(ours - posed(folder, ready, names, 25)).max(axis=0)
     loose = [k for k, name in enumerate(names) if name.startswith(("arm_rot", "pro_sup", "elbow"))]  # hardly marked
     assert np.degrees(np.delete(away, loose)).max() < 0.1
@@ -82,10 +82,10 @@ def test_moments_are_opensims(folder: Path, ready: Prepared, motion: RigidMotion
     table.addTableMetaDataString("inDegrees", "no")
     opensim.STOFileAdapter.write(table, str(tmp_path / "coordinates.sto"))
     theirs = inverse_dynamics(folder, tmp_path)
-    assert ready.contacts is not None
+    assert ready.measured.contacts is not None
     external = np.zeros((len(motion.states), len(motion.model.segment_names), 6))
-    for k, segment in enumerate(ready.contacts.segments[:2]):
-        external[:, motion.model.segment_names.index(segment)] = ready.contacts.wrench[:, k]
+    for k, segment in enumerate(ready.measured.contacts.segments[:2]):
+        external[:, motion.model.segment_names.index(segment)] = ready.measured.contacts.wrench[:, k]
     ours = motion.moments(external)
     for joint in ("hip_flexion", "hip_adduction", "knee_angle", "ankle_angle"):
         for side in "rl":

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError, StreamError
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import sample_arrays
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate_squat
@@ -56,7 +57,7 @@ def test_live_equals_offline_on_the_same_samples(squat: Recording) -> None:
         ),
     )
     wrench = initial.ground.wrench_to_ground(squat.total_wrench())[begin:]
-    arrays = offline.run_arrays(time_, markers, wrench)
+    arrays = offline.run_arrays(Measurements(time_, markers, wrench))
     np.testing.assert_allclose(np.stack([f.state for f in frames]), arrays["state"], atol=1e-9)
 
 
@@ -87,7 +88,7 @@ def test_a_live_session_with_a_lag_gives_what_a_recording_with_it_gives(squat: R
     initial, samples = live.tracker.calibrated, [frame.fused.sample for frame in frames]
     markers, wrench = (np.stack(rows) for rows in zip(*(sample_arrays(one, initial) for one in samples), strict=True))
     time_ = np.array([one.time_s for one in samples])
-    arrays = live.tracker.fresh().run_late_arrays(5, time_, markers, wrench)
+    arrays = live.tracker.fresh().run_late_arrays(5, Measurements(time_, markers, wrench))
     late = [frame.published for frame in frames[5:] if frame.published is not None]
     np.testing.assert_allclose([one.time_s for one in late], time_[:-5], atol=1e-9)
     np.testing.assert_allclose(np.stack([one.moments for one in late]), arrays["moments"][:-5], atol=1e-8)

@@ -10,14 +10,12 @@ average out, and data that count for more would only bend them further.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import DivergenceError
 from dynakin.filter.augment import continuous_noise
-from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.noise import joint_groups
 from dynakin.filter.tracker import Tracker
 from dynakin.progress import Progress
@@ -53,20 +51,6 @@ LATE_SHARE = 0.8
 change, which the next frame hardly shows."""
 
 
-class Samples(NamedTuple):
-    """What a tracker runs over, as `Tracker.run_arrays` takes it."""
-
-    time: Array
-    markers: Array
-    wrench: Array
-    contacts: ContactLoads | None
-
-    def first(self, frames: int) -> Samples:
-        """Its first frames."""
-        contacts = self.contacts and self.contacts.first(frames)
-        return Samples(self.time[:frames], self.markers[:frames], self.wrench[:frames], contacts)
-
-
 def frames_that_show(time: Array, markers: Array) -> int:
     """How many first frames a run has to see for its noise to be that of the recording: (T,) s, (T, M, 3) m."""
     least = int(np.searchsorted(time, time[0] + SHOWN_S, side="right"))
@@ -84,7 +68,7 @@ def frames_that_show(time: Array, markers: Array) -> int:
 def calibrated_noise(
     tracker: Tracker,
     arrays: dict[str, Array],
-    trial: Samples,
+    trial: Measurements,
     frames: Flags | None = None,
     *,
     late: bool = False,
@@ -112,9 +96,8 @@ def calibrated_noise(
     if not groups or before is None or not _mostly_followed(arrays, chosen[:end]):
         return _believed(_scaled(noise, ratio), noise, late)
     scaled = _scaled(noise, ratio, jerk_ratios(tracker, arrays, trial.time, chosen, groups))
-    time, markers, wrench, contacts = trial.first(end)
     try:
-        again = tracker.changed(scaled).run_arrays(time, markers, wrench, progress, contacts, state_only=True)
+        again = tracker.changed(scaled).run_arrays(trial.first(end), progress, state_only=True)
     except DivergenceError:  # with other jerk: the factor alone leaves the movement as it is
         return _believed(_scaled(noise, ratio), noise, late)
     after = nis_per_row(again, chosen[:end])

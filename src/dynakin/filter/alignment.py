@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.ground.closure import plates_misfit
 from dynakin.filter.ground.delay import Delay, clock_in_words
-from dynakin.filter.samples import in_step
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -43,35 +42,32 @@ class InStep(NamedTuple):
 
 def run_in_step(
     tracker: Tracker,
-    time: Array,
-    markers: Array,
-    wrench: Array,
+    measured: Measurements,
     progress: Progress | None = None,
-    feet: ContactLoads | None = None,
     passes: int = PASSES,
-    run: Callable[..., dict[str, Array]] = Tracker.run_arrays,
+    run: Callable[[Tracker, Measurements, Progress | None], dict[str, Array]] = Tracker.run_arrays,
 ) -> InStep:
     """A run, again (``passes`` times at most) with the plates brought into step where they turn out to lag.
 
     Args:
-        tracker: at its start. run: takes a tracker and the arguments of `Tracker.run_arrays`, and gives what that does.
+        tracker: at its start. run: as `Tracker.run_arrays`.
     """
     calibrated = tracker.calibrated
-    arrays, shift = run(tracker, time, markers, wrench, progress, feet), 0.0
+    arrays, shift = run(tracker, measured, progress), 0.0
     misfit = None
     for done in range(passes):
         delay = delay_of(calibrated, arrays["state"][-1], arrays["state_sd"][-1])
         if delay is None or not delay.beyond(LEAST_S, SIGMAS):
             break
         if not done:  # of nearly every run nobody asks
-            misfit = plates_misfit(calibrated, time, markers, wrench)
-        taken = in_step(time, wrench, shift + delay.delay_s)
-        fits = plates_misfit(calibrated, time, markers, taken)
+            misfit = plates_misfit(calibrated, *measured[:3])
+        taken = measured.in_step(shift + delay.delay_s)
+        fits = plates_misfit(calibrated, *taken[:3])
         if misfit is not None and fits is not None and fits > misfit:
             return InStep(tracker, arrays, shift, [contradicted(shift + delay.delay_s, misfit, fits)])
         shift, misfit = shift + delay.delay_s, fits
         tracker = tracker.fresh()
-        arrays = run(tracker, time, markers, taken, progress, feet and feet.in_step(time, shift))
+        arrays = run(tracker, taken, progress)
     delay = delay_of(calibrated, arrays["state"][-1], arrays["state_sd"][-1])
     return InStep(tracker, arrays, shift, in_words(shift, delay))
 

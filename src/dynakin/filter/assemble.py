@@ -10,18 +10,20 @@ import numpy.typing as npt
 
 from dynakin.arrays import finite
 from dynakin.bindings import _core
-from dynakin.filter.augment import variance_scales
+from dynakin.filter.augment import initial_covariance, variance_scales
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.impossible import impossible, impossible_in_words
 from dynakin.filter.labels import labels
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.noise import limit_sd, prior_factor
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sight import hidden_segments
 from dynakin.filter.sources import ContactSources, with_sources
 from dynakin.filter.systematic import Systematic
 from dynakin.filter.taken import with_taken
+from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
@@ -32,7 +34,6 @@ from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.measures.facing import nearly_singular
 from dynakin.results.measures.sources import MEASURED, plates_refused, refused_for_long, wrench_sources
 from dynakin.results.records import NO_ESTIMATE_CODES, Timing
-from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
 
 if TYPE_CHECKING:
@@ -46,15 +47,11 @@ MANY_REFUSED = 0.2
 
 def assemble(
     arrays: Mapping[str, Array],
-    model: _core.Model,
-    initial: CalibratedModel,
+    tracker: Tracker,
     recording: Recording,
-    measured: tuple[Array, Array],
+    measured: Measurements,
     config: dict[str, Any],
     notes: Sequence[Message],
-    covariances: tuple[Array, Array],
-    used: Noise,
-    feet: ContactLoads | None = None,
     undeclared: npt.NDArray[np.bool_] | None = None,
     systematic: Systematic | None = None,
     low_pass: LowPass | None = None,
@@ -63,19 +60,18 @@ def assemble(
 
     Args:
         arrays: as `_core.Filter.run` returns them, T frames.
-        measured: markers (T, M, 3) and wrench (T, 6), as the filter took them.
+        tracker: as that run left it. Constants have deviations by the declared variances, without the
+            ``variance_scale`` of its noise: what is wrong with a place or a length does not average out.
+        measured: as the filter took it; with the contacts' wrenches that the moments were made with.
         config: what was asked for, as plain data; "ground": why something is not measured, and by how much the plates
             were brought into step.
         notes: sentences of the plates' check.
-        covariances: P (n, n) before the first frame and after the last.
-        used: the noise of the filter. Constants have deviations by the declared variances, without its
-            ``variance_scale``: what is wrong with a place or a length does not average out.
-        feet: the wrenches that the moments were made with, None where there were none.
         undeclared: (T,) frames in which something bears the person that no plate measures.
         systematic: what is added to the filter's deviations of angles, speeds, accelerations and moments.
         low_pass: what the markers went through before they were given.
     """
-    whole = _dataset(arrays, model, initial, recording, measured, feet)
+    initial, model, used, feet = tracker.calibrated, tracker.core_model, tracker.noise, measured.contacts
+    whole = _dataset(arrays, model, initial, measured)
     ground = {"reasons": [], "plates_behind_s": 0.0} | config.get("ground", {})
     beyond, reasons = None, list(ground["reasons"])
     if feet is not None:
@@ -95,7 +91,7 @@ def assemble(
         ContactSources.of(initial),
         feet,
         np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared,
-        hidden_segments(model, arrays["state"], measured[0], recording.time, arrays["verdicts"]),
+        hidden_segments(model, arrays["state"], measured.markers, recording.time, arrays["verdicts"]),
         beyond,
         says_carried(notes),
     )
@@ -103,15 +99,15 @@ def assemble(
         _widen_priors(data, prior_factor(used), feet.blind)
         data = _with_total(data, feet)
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])
-    names = ("initial_covariance", "final_covariance")
-    data.update({name: (("element", "element_"), P) for name, P in zip(names, covariances, strict=True)})
+    covariances = {"initial": initial_covariance(initial, used), "final": tracker.covariance}
+    data.update({f"{when}_covariance": (("element", "element_"), P) for when, P in covariances.items()})
     noise = config.get("noise", {})
     declared = 1.0 / np.sqrt(variance_scales(initial.names, used))
     parameters = parameters_of(
         initial,
         arrays["state"][-1],
         declared * arrays["state_sd"][-1],
-        declared * np.sqrt(np.diag(covariances[0])),
+        declared * np.sqrt(np.diag(covariances["initial"])),
         noise.get("length_skin_fraction", 0.0),
     )
     constants = [initial.names.index(p.name) for p in parameters if p.estimated]
@@ -209,13 +205,11 @@ def _dataset(
     arrays: Mapping[str, Array],
     model: _core.Model,
     initial: CalibratedModel,
-    recording: Recording,
-    measured: tuple[Array, Array],
-    feet: ContactLoads | None,
+    measured: Measurements,
 ) -> xr.Dataset:
     import xarray as xr  # it is loaded while the core works
 
-    spec = initial.spec
+    spec, feet = initial.spec, measured.contacts
     axes = np.array(spec.markers[0].measured)
     modelled = np.array(spec.wrench_measured)
     data: dict[str, Any] = {}
@@ -227,15 +221,15 @@ def _dataset(
         data["coupled_coordinates"] = (("time", "coupled_coordinate"), values)
     data["moments"] = (("time", "coordinate"), arrays["moments"])
     data["moments_sd"] = (("time", "coordinate"), arrays["moments_sd"])
-    missing = np.count_nonzero(np.isnan(measured[0]), axis=2, keepdims=True) > 0
+    missing = np.count_nonzero(np.isnan(measured.markers), axis=2, keepdims=True) > 0
     for name, values in (
-        ("measured", np.where(missing, np.nan, measured[0])),
+        ("measured", np.where(missing, np.nan, measured.markers)),
         ("estimated", arrays["markers_estimated"]),
         ("predicted", arrays["markers_predicted"]),
     ):
         data[f"markers_{name}"] = (("time", "marker", "axis"), np.where(axes, values, np.nan))
     for name, values in (
-        ("measured", measured[1]),
+        ("measured", measured.wrench),
         ("estimated", arrays["wrench_estimated"]),
         ("predicted", arrays["wrench_predicted"]),
     ):
@@ -246,13 +240,13 @@ def _dataset(
     data["state_sd"] = (("time", "element"), arrays["state_sd"])
     for name in ("nis", "n_rows", "log_likelihood", "constrained", "constraints_met", "tracking", "step_us"):
         data[name] = ("time", arrays[name])
-    data |= _sensors(arrays, np.asarray(np.isnan(measured[1]).all(axis=1)))
+    data |= _sensors(arrays, np.asarray(np.isnan(measured.wrench).all(axis=1)))
     if initial.feet or any(any(marker.soft_tissue) for marker in spec.markers):
         data["soft_tissue_amplitude"] = ("marker", initial.soft_tissue_m, {"units": "m"})
     data |= _body(arrays, model, axes, modelled, feet)
     if feet is not None:
         data |= _feet(arrays, feet)
-    return xr.Dataset(data, coords=labels(model, initial, recording.time, feet))
+    return xr.Dataset(data, coords=labels(model, initial, measured.time, feet))
 
 
 def _sensors(arrays: Mapping[str, Array], unmeasured: npt.NDArray[np.bool_]) -> dict[str, Any]:

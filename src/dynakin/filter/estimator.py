@@ -4,28 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.filter.adapt import CALIBRATED_S, Samples, calibrated_noise, frames_that_show
-from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.assemble import assemble
-from dynakin.filter.augment import initial_covariance
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.ground.known import known_ground
 from dynakin.filter.ground.place import off_place
 from dynakin.filter.joint_errors import hips_turned
+from dynakin.filter.measurements import Measurements
+from dynakin.filter.passes import passes
 from dynakin.filter.prepared import Prepared
-from dynakin.filter.samples import in_step, marker_paths, total_wrench
-from dynakin.filter.skin import following_skin, may_follow, skin_found
+from dynakin.filter.samples import marker_paths, total_wrench
+from dynakin.filter.skin import skin_found
 from dynakin.filter.tracker import Tracker
-from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.declared import with_contacts, with_loads
 from dynakin.model.calibration.how import Calibration
@@ -255,19 +253,10 @@ class Estimator:
         contacts = None
         if feet is not None:
             contacts = feet(calibrated)
-        elif ground.loads is not None:
-            paths = ContactPaths.of(calibrated).at(markers)
-            contacts = expected_loads(
-                ground.loads,
-                calibrated,
-                self.noise,
-                paths,
-                ground.undeclared,
-                ground.bears,
-                ground.shear,
-                ground.off_gain,
-            )
-        return Prepared(recording, tracker, markers, wrench, ground, contacts, lag_s, tuple(unsmoothed))
+        elif (bearing := ground.bearing()) is not None:
+            contacts = expected_loads(bearing, calibrated, self.noise, ContactPaths.of(calibrated).at(markers))
+        measured = Measurements(recording.time, markers, wrench, contacts)
+        return Prepared(recording, tracker, measured, ground, lag_s, tuple(unsmoothed))
 
     @one_blas_thread
     def follow(self, ready: Prepared, progress: Progress | None = None) -> Tracked:
@@ -276,69 +265,39 @@ class Estimator:
         Raises:
             RecordingError, DivergenceError: as in `run`.
         """
-        recording, calibrated, markers = ready.recording, ready.calibrated, ready.markers
-        lag_s, ground, on_feet = ready.lag_s, ready.ground, ready.contacts
-        late = frames_later(lag_s, recording.rate)
-        lag_s = ALL_FRAMES if late is None else late / recording.rate
-        adapt, notes = ready.tracker.noise.calibrates(bool(calibrated.feet)), list(ground.notes)
+        recording, calibrated, ground = ready.recording, ready.calibrated, ready.ground
         try:
-            # joints found from markers are off by what follows angles as skin does
-            scaled = late is None and calibrated.plan is None and may_follow(calibrated, ready.tracker.noise)
-            once = not (adapt or scaled)  # a first run shows nothing that the next is to know
-            frames, ways = recording.n_frames, 2 if late is None else 1
-            # of a body that is fixed nowhere it shows the noise alone: a part of the recording is enough
-            shown = frames_that_show(recording.time, markers) if adapt and calibrated.feet and not scaled else frames
-            again = min(frames, round(CALIBRATED_S * recording.rate)) if adapt else 0
-            shares = (ways * frames, 0, 0) if once else (shown, again, ways * frames)
-            there, calibrating, back = _shares(progress, shares)
-            passes = 0 if ground.doubt else PASSES
-
-            def first(own: Tracker, *trial: Any) -> dict[str, Array]:
-                return own.run_late_arrays(late, *trial) if once else own.run_arrays(*trial, state_only=True)
-
-            time, taken, moved, loads = Samples(recording.time, markers, ready.wrench, on_feet).first(shown)
-            tracker, arrays, shift, clock = run_in_step(
-                ready.tracker.fresh(), time, taken, moved, there, loads, passes, first
-            )
-            wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
-            on_feet = on_feet and on_feet.in_step(recording.time, shift)
-            trial = Samples(recording.time, markers, wrench, on_feet).first(shown)
-            found = calibrated_noise(tracker, arrays, trial, late=not lag_s, progress=calibrating) if adapt else None
-            if adapt and found is None:
-                notes.append(
-                    note("noise", "Too few frames are followed to calibrate the noise on them: it is as declared.")
-                )
-            if not once:
-                skin = following_skin(tracker, arrays, recording.time) if scaled else None
-                seen = markers if skin is None else markers - skin.shift_m
-                tracker = tracker.changed(found or tracker.noise)
-                arrays = tracker.run_late_arrays(late, recording.time, seen, wrench, back, on_feet)
-                arrays = arrays if skin is None else skin.put_back(arrays)
+            tracker, arrays, measured, notes, clock = passes(ready, progress)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        found_of = {"reasons": [reason.text for reason in ground.reasons], "plates_behind_s": ground.behind_s}
-        config = self.settings() | {"lag_s": lag_s, "ground": found_of}
+        late = frames_later(ready.lag_s, recording.rate)
+        config = self.settings() | {
+            "lag_s": ALL_FRAMES if late is None else late / recording.rate,
+            "ground": {"reasons": [reason.text for reason in ground.reasons], "plates_behind_s": ground.behind_s},
+            "noise_used": tracker.noise.scales(),
+        }
         doubt = clock if ground.usable else []
         if ground.doubt:
             unsought = " No further delay of the plates is sought, because a wrong mass looks like one."
             doubt = [replace(ground.doubt, text=ground.doubt.text + unsought * (not calibrated.feet))]
-        config["noise_used"] = tracker.noise.scales()
-        notes += [*doubt, *ready.unsmoothed]
-        plates = [plate.name for plate in recording.plates]
+        notes = [*ground.notes, *notes, *doubt, *ready.unsmoothed]
         if not ground.doubt:
-            place = off_place(ground, calibrated, tracker.core_model, arrays["state"], wrench, plates)
+            plates = [plate.name for plate in recording.plates]
+            place = off_place(ground, calibrated, tracker.core_model, arrays["state"], measured.wrench, plates)
             notes += [place] if place else []
+        systematic = None
         if tracker.systematic is not None:
             notes += tracker.systematic.misfit(arrays["state"][-1])
-        turned = hips_turned(calibrated, arrays["state"])
-        systematic = tracker.systematic and tracker.systematic.with_found(
-            ground.clock_sd_s, ground.in_hands_kg, skin_found(calibrated, arrays), turned
-        )
-        covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
+            systematic = tracker.systematic.with_found(
+                ground.clock_sd_s,
+                ground.in_hands_kg,
+                skin_found(calibrated, arrays),
+                hips_turned(calibrated, arrays["state"]),
+            )
+        undeclared = ready.undeclared(measured.contacts)
         estimate = assemble(
-            arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances,
-            tracker.noise, on_feet, ready.undeclared(on_feet), systematic, found_low_pass(recording),
-        )  # fmt: skip
+            arrays, tracker, recording, measured, config, notes, undeclared, systematic, found_low_pass(recording)
+        )
         return Tracked(without_lost(estimate), tracker)
 
     def measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array, Ground]:
@@ -369,11 +328,3 @@ class Estimator:
             "priors": self.priors.model_dump(mode="json"),
             "bounds": self.bounds.model_dump(mode="json"),
         }
-
-
-def _shares(progress: Progress | None, passes: Sequence[int]) -> list[Progress | None]:
-    """One progress for passes that follow each other, each over so many frames."""
-    if progress is None:
-        return [None] * len(passes)
-    before, total = [sum(passes[:k]) for k in range(len(passes))], sum(passes)
-    return [lambda done, _, first=first: progress(first + done, total) for first in before]  # type: ignore[misc]

@@ -12,6 +12,7 @@ from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.labels import labels
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.sight import hidden_segments
 from dynakin.filter.sources import ContactSources
 from dynakin.filter.tracker import Tracker
@@ -30,20 +31,17 @@ class Prepared:
 
     Attributes:
         tracker: at its start.
-        markers: (T, M, 3) m, of the model, ground frame. wrench: (T, 6), the total as the plates measure it; NaN where
-            they do not.
-        ground: what is known of the ground reaction. contacts: the wrench of each contact; None of a model that stands
-            on its root.
+        measured: what the filter takes: the total wrench as the plates measure it, and each contact's (None of a model
+            that stands on its root).
+        ground: what is known of the ground reaction.
         lag_s: each frame is to be estimated from the frames until so much later; inf: from all.
         unsmoothed: a sentence where there is no smoother.
     """
 
     recording: Recording
     tracker: Tracker
-    markers: Array
-    wrench: Array
+    measured: Measurements
     ground: Ground
-    contacts: ContactLoads | None
     lag_s: float
     unsmoothed: tuple[Message, ...]
 
@@ -70,16 +68,16 @@ class Prepared:
         frames in which the filter will lose the person or refuse the plates are not known yet."""
         import xarray as xr  # the slowest library of all: what precedes the core does without
 
-        calibrated = self.calibrated
+        calibrated, contacts = self.calibrated, self.measured.contacts
         known = ContactSources.of(calibrated)
-        sources = known.moments(self.contacts, carried=says_carried(self.ground.notes))
-        if self.contacts is None:
-            blind = np.isnan(self.wrench).all(axis=1)
+        sources = known.moments(contacts, carried=says_carried(self.ground.notes))
+        if contacts is None:
+            blind = np.isnan(self.measured.wrench).all(axis=1)
             codes = np.where(self.ground.undeclared, ABSENT, np.where(blind, DERIVED, MEASURED))
             sources = np.maximum(sources, codes[:, None]).astype(np.uint8)
-        hidden = hidden_segments(self.tracker.core_model, calibrated.x0, self.markers, self.recording.time)
+        hidden = hidden_segments(self.tracker.core_model, calibrated.x0, self.measured.markers, self.recording.time)
         sources[known.unseen(hidden, len(sources))] = ABSENT
-        data = xr.Dataset(coords=labels(self.tracker.core_model, calibrated, self.recording.time, self.contacts))
-        if self.contacts is not None:
-            data = data.isel(foot=[name != RESIDUAL for name in self.contacts.names])
+        data = xr.Dataset(coords=labels(self.tracker.core_model, calibrated, self.recording.time, contacts))
+        if contacts is not None:
+            data = data.isel(foot=[name != RESIDUAL for name in contacts.names])
         return source_figures(data, sources, [reason.text for reason in self.ground.reasons])

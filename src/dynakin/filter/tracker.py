@@ -15,6 +15,7 @@ from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.contacts import ContactLoads, stands_off_plates
 from dynakin.filter.core_filter import core_filter, smoothed
 from dynakin.filter.live.feet import LiveFeet
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.noise import prior_factor
 from dynakin.filter.reported_sd import BLOCKS, as_believed
 from dynakin.filter.samples import Sample, sample_arrays
@@ -305,21 +306,12 @@ class Tracker:
         return min(self._stepped, key=lambda step: abs(step.time_s - time))
 
     def run_arrays(
-        self,
-        time: Array,
-        markers: Array,
-        wrench: Array,
-        progress: Progress | None = None,
-        feet: ContactLoads | None = None,
-        *,
-        state_only: bool = False,
+        self, measured: Measurements, progress: Progress | None = None, *, state_only: bool = False
     ) -> dict[str, Array]:
-        """Go on over arrays, from the present state.
+        """Go on over T frames, from the present state.
 
         Args:
-            time: (T,) s. markers: (T, M, 3) m, ground frame, in the order of the model's markers. wrench: (T, 6) N and
-                N m, ground on person, about the ground origin. NaN: not measured.
-            progress, feet: as in `Estimator.run`.
+            progress: as in `Estimator.run`.
             state_only: without what follows from the state (markers, wrenches, moments, their deviations) and what
                 was expected of sensors: it takes a third of the time that the rest takes, and changes none of it.
 
@@ -330,32 +322,19 @@ class Tracker:
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
         run = partial(self._filter.run, output_sd=not state_only, state_only=state_only)
-        return self._run(run, (time, markers, wrench), (progress,), feet)
+        return self._run(run, measured, progress)
 
-    def run_smoothed_arrays(
-        self,
-        time: Array,
-        markers: Array,
-        wrench: Array,
-        progress: Progress | None = None,
-        feet: ContactLoads | None = None,
-    ) -> dict[str, Array]:
+    def run_smoothed_arrays(self, measured: Measurements, progress: Progress | None = None) -> dict[str, Array]:
         """`run_arrays`, then backwards over the same frames: the smoothed arrays take the places of the filtered.
 
         Raises:
             ConfigError: the bounds are kept in a way that has no smoother. DivergenceError: as `run_arrays`.
         """
         check_can_smooth(self.noise)
-        return smoothed(self._run(self._filter.run_smoothed, (time, markers, wrench), (progress,), feet))
+        return smoothed(self._run(self._filter.run_smoothed, measured, progress))
 
     def run_late_arrays(
-        self,
-        lag: int | None,
-        time: Array,
-        markers: Array,
-        wrench: Array,
-        progress: Progress | None = None,
-        feet: ContactLoads | None = None,
+        self, lag: int | None, measured: Measurements, progress: Progress | None = None
     ) -> dict[str, Array]:
         """Each frame estimated from those until ``lag`` frames later: what `delayed` gives of it, with its deviations,
         and the last frames from those that there are. None: `run_smoothed_arrays`; 0: `run_arrays`.
@@ -364,23 +343,19 @@ class Tracker:
             ConfigError, DivergenceError: as `run_smoothed_arrays`.
         """
         if lag is None:
-            return self.run_smoothed_arrays(time, markers, wrench, progress, feet)
+            return self.run_smoothed_arrays(measured, progress)
         if not lag:
-            return self.run_arrays(time, markers, wrench, progress, feet)
+            return self.run_arrays(measured, progress)
         check_can_smooth(self.noise)
-        return smoothed(self._run(self._filter.run_lagged, (time, markers, wrench), (lag, progress), feet))
+        return smoothed(self._run(partial(self._filter.run_lagged, lag=lag), measured, progress))
 
     def _run(
-        self,
-        run: Callable[..., dict[str, Array]],
-        measured: tuple[Array, Array, Array],
-        how: tuple[Any, ...],
-        feet: ContactLoads | None,
+        self, run: Callable[..., dict[str, Array]], measured: Measurements, progress: Progress | None
     ) -> dict[str, Array]:
-        """One of the core's runs over time, markers and wrench, from the present state."""
-        time, markers, wrench = (np.ascontiguousarray(values) for values in measured)
-        wrench, given = self._given(wrench, feet)
-        arrays = run(time, markers, wrench, *how, **given)
+        """One of the core's runs, from the present state."""
+        time, markers, wrench = (np.ascontiguousarray(values) for values in measured[:3])
+        wrench, given = self._given(wrench, measured.contacts)
+        arrays = run(time, markers, wrench, progress=progress, **given)
         self._time, self._latest = float(time[-1]), None
         return arrays
 

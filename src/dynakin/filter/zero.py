@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from dynakin.errors import RecordingError
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.declared import with_loads
@@ -76,7 +77,7 @@ def _estimated_anew(estimator: Estimator, estimate: Estimate, standing: Recordin
     markers = marker_paths(still, initial, gaps=True)
     wrench = total_wrench(still, initial, gaps=True, lacking=not still.plates)
     run = tracker.run_smoothed_arrays if can_smooth(estimator.noise) else tracker.run_arrays
-    state = run(still.time, markers, wrench)["state"]
+    state = run(Measurements(still.time, markers, wrench))["state"]
     free = free_names(initial.spec)
     kinds = kinds_of(initial.spec.segments)
     turning = np.array([kinds[name] == "rotation" for name in free])

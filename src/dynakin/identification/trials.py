@@ -13,6 +13,7 @@ from dynakin.arrays import filled
 from dynakin.bindings import _core
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import marker_paths
 from dynakin.filter.sight import hidden_segments, root_of
 from dynakin.filter.sources import ContactSources
@@ -185,10 +186,9 @@ class Common:
         coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
         frozen = freeze(self.initial, initial_values(self.initial), coordinates)
         tracker = self.estimator.start(frozen)
-        arrays = tracker.run_smoothed_arrays(
-            recording.time, markers, np.full((recording.n_frames, 6), np.nan), progress
-        )  # fmt: skip
-        judged = as_estimate(self.estimator, tracker, arrays, recording, markers)
+        measured = Measurements(recording.time, markers, np.full((recording.n_frames, 6), np.nan))
+        arrays = tracker.run_smoothed_arrays(measured, progress)
+        judged = as_estimate(self.estimator, tracker, arrays, recording, measured)
         if (reason := why_lost(judged)) is not None:
             raise LostError(f"{recording.path or recording.name}: {reason}")
         every = max(1, round(1.0 / (RATE_HZ * step_of(recording.time))))

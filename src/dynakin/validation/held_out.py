@@ -13,6 +13,7 @@ from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.ground.known import known_ground
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import marker_paths
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note, warnings_of
@@ -147,7 +148,7 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     standing = identified.static or identified.recording
     start = start_as(measured, setup.common, recording, standing, identified.ground)
     markers = marker_paths(recording, measured, start.ground, lacking=True)
-    blank = np.full((recording.n_frames, 6), np.nan)
+    seen = Measurements(recording.time, markers, np.full((recording.n_frames, 6), np.nan))
     coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
     found: dict[str, Array] = {}
     for preset in identified.estimates:
@@ -156,8 +157,8 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
         for label, values in identified.constants(preset).items():
             method, estimator = f"EKF ({preset}), {label}", identified.estimator(preset)
             tracker = estimator.start(freeze(measured, values, coordinates))
-            arrays = tracker.run_late_arrays(late, recording.time, markers, blank)
-            _refuse_lost(as_estimate(estimator, tracker, arrays, recording, markers), method)
+            arrays = tracker.run_late_arrays(late, seen)
+            _refuse_lost(as_estimate(estimator, tracker, arrays, recording, seen), method)
             found[method] = arrays["wrench_estimated"]
         if identified.subject is not None:
             label = BATCH if identified.subject.use == "bodies" else "table"
@@ -225,25 +226,11 @@ def measured_wrench(
 
 
 def as_estimate(
-    estimator: Estimator, tracker: Tracker, arrays: Mapping[str, Array], recording: Recording, markers: Array
+    estimator: Estimator, tracker: Tracker, arrays: Mapping[str, Array], recording: Recording, measured: Measurements
 ) -> Estimate:
-    """What a tracker that an estimator started made of a recording's markers (T, M, 3) m alone, judged frame by frame
-    like any other estimate."""
-    measured = (markers, np.full((recording.n_frames, 6), np.nan))
-    covariances = (tracker.covariance, tracker.covariance)
-    return without_lost(
-        assemble(
-            arrays,
-            tracker.core_model,
-            tracker.calibrated,
-            recording,
-            measured,
-            estimator.settings(),
-            [],
-            covariances,
-            tracker.noise,
-        )
-    )
+    """What a tracker that an estimator started made of what was measured, judged frame by frame like any other
+    estimate."""
+    return without_lost(assemble(arrays, tracker, recording, measured, estimator.settings(), []))
 
 
 def _refuse_lost(estimate: Estimate, method: str) -> None:

@@ -14,6 +14,7 @@ from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.core_filter import filter_settings
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.measurements import Measurements
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
@@ -177,7 +178,7 @@ def _left_out(estimator: Estimator, preset: str, trial: _Trial, progress: Progre
     for k in range(count):
         hidden = trial.markers.copy()
         hidden[first:, k] = np.nan
-        arrays = estimator.start(trial.initial).run_arrays(time, hidden, trial.wrench)
+        arrays = estimator.start(trial.initial).run_arrays(Measurements(time, hidden, trial.wrench))
         single |= trial.marker_errors(LEFT_OUT, f"EKF ({preset})", arrays["markers_estimated"], [k])
         if progress is not None:
             progress(k + 1, count)
@@ -193,7 +194,7 @@ def _ahead(estimator: Estimator, preset: str, trial: _Trial, horizon_s: float) -
     time, initial = trial.recording.time, trial.initial
     yardstick = ahead(horizon_s)
     frames = span_frames(time, horizon_s)
-    states = estimator.start(initial).run_arrays(time, trial.markers, trial.wrench)["state"]
+    states = estimator.start(initial).run_arrays(Measurements(time, trial.markers, trial.wrench))["state"]
     model = _core.Model(initial.spec)
     settings = filter_settings(initial, estimator.noise, model.layout, estimator.estimate)
     covariance = np.diag(initial.sd0**2)  # the mean's prediction does not depend on it

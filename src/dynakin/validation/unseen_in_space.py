@@ -89,10 +89,10 @@ def figures_in_space(
     cutoffs = usual_cutoffs(setup.cutoff_hz, trial.time)
     left_out: Figures = {}
     for group in groups:
-        hidden = trial.ready.markers.copy()
+        hidden = trial.ready.measured.markers.copy()
         hidden[:, group] = np.nan
         for name, each in ready.items():
-            estimate = estimators[name].follow(replace(each, markers=hidden)).estimate
+            estimate = estimators[name].follow(replace(each, measured=each.measured._replace(markers=hidden))).estimate
             left_out |= trial.markers(LEFT_OUT, name, _of(estimate, "markers_estimated", trial.window), group)
             stepped()
         for cutoff, motion in rigid_motions(trial.calibrated, trial.time, hidden, cutoffs).items():
@@ -104,14 +104,14 @@ def figures_in_space(
         stepped()
         ahead_of[name] = _ahead(estimators[name], each, horizon_s)
         stepped()
-    markers = trial.ready.markers
+    markers = trial.ready.measured.markers
     for cutoff, motion in rigid_motions(trial.calibrated, trial.time, markers, cutoffs).items():
         withheld |= trial.wrench(WITHHELD, {inverse_name(cutoff): motion.wrench()})
     frames = span_frames(trial.time, horizon_s)
     for cutoff, motion in _classical_ahead(trial, cutoffs, horizon_s).items():
         ahead_of[inverse_name(cutoff)] = motion.markers(), motion.wrench()
     for name, guess in ((PERSISTENCE, persisted), (LINEAR, lambda a, n: extrapolated(trial.time, a, n))):
-        ahead_of[name] = guess(markers, frames), guess(trial.ready.wrench, frames)
+        ahead_of[name] = guess(markers, frames), guess(trial.ready.measured.wrench, frames)
     return with_mean(LEFT_OUT, left_out) | withheld | _ahead_figures(trial, ahead(horizon_s), ahead_of)
 
 
@@ -137,11 +137,11 @@ class _Judged:
         self.window = evaluation_window(self.time)
         ground = self.calibrated.ground
         self.turn = ground.facing().rotation @ ground.rotation.T
-        self.below = ContactPaths.of(self.calibrated).at(ready.markers)[:, 0] * [1.0, 0.0, 1.0]
+        self.below = ContactPaths.of(self.calibrated).at(ready.measured.markers)[:, 0] * [1.0, 0.0, 1.0]
 
     def markers(self, yardstick: str, method: str, places: Array, columns: Sequence[int]) -> Figures:
         """RMS distance (mm) of some markers (T, M, 3), over the window."""
-        measured, w, axes = self.ready.markers, self.window, np.ones(3, dtype=bool)
+        measured, w, axes = self.ready.measured.markers, self.window, np.ones(3, dtype=bool)
         return {
             (yardstick, self.calibrated.recorded_markers[k], method): marker_rms_mm(measured[w, k], places[w, k], axes)
             for k in columns
@@ -149,7 +149,7 @@ class _Judged:
 
     def wrench(self, yardstick: str, wrenches: dict[str, Array]) -> Figures:
         """RMS (N, N m) of each component of wrenches (T, 6), where the plates measure all that acts."""
-        measured = self._seen(self.ready.wrench)[self.window]
+        measured = self._seen(self.ready.measured.wrench)[self.window]
         if not np.isfinite(measured).any():
             return {}
         return {
@@ -203,7 +203,7 @@ def _ahead(estimator: Estimator, ready: Prepared, horizon_s: float) -> tuple[Arr
 def _classical_ahead(trial: _Judged, cutoffs: tuple[float, ...], horizon_s: float) -> dict[float, RigidMotion]:
     """The rigid model as the angles of the half second until ``horizon_s`` before say it."""
     time, model = trial.time, fixed_model(trial.calibrated)
-    coordinates = inverse_kinematics(trial.calibrated, filled(time, trial.ready.markers))
+    coordinates = inverse_kinematics(trial.calibrated, filled(time, trial.ready.measured.markers))
     past, frames = max(span_frames(time, _PAST_S), _FEWEST_FRAMES), span_frames(time, horizon_s)
     unknown = np.full((past - 1, coordinates.shape[1]), np.nan)
     found = {}

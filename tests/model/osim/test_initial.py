@@ -13,6 +13,7 @@ import dynakin
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.augment import initial_covariance
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.systematic import Systematic
 from dynakin.messages import Message
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -178,7 +179,7 @@ def test_the_filter_runs_on_it(folder: Path, squats: Recording) -> None:
     from dynakin.filter.samples import marker_paths, total_wrench
 
     markers, wrench = (read(squats, tracker.calibrated, gaps=True)[:50] for read in (marker_paths, total_wrench))
-    arrays = tracker.run_arrays(squats.time[:50], markers, wrench)
+    arrays = tracker.run_arrays(Measurements(squats.time[:50], markers, wrench))
     gap = arrays["markers_estimated"] - markers
     assert np.isfinite(arrays["state"]).all()
     assert np.sqrt(np.nanmean((gap**2).sum(axis=2))) < 0.0085

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dynakin
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.settings.model import Quantity
@@ -32,7 +33,7 @@ def marker_rms_mm(folder: Path, estimate: tuple[Quantity, ...]) -> float:
     markers = marker_paths(recording, tracker.calibrated, gaps=True)
     wrench = total_wrench(recording, tracker.calibrated, gaps=True)
     assert markers.shape[1] == 45
-    found = tracker.run_arrays(recording.time, markers, np.full_like(wrench, np.nan))["markers_estimated"]
+    found = tracker.run_arrays(Measurements(recording.time, markers, np.full_like(wrench, np.nan)))["markers_estimated"]
     return 1000.0 * float(np.sqrt(np.nanmean(((found - markers) ** 2).sum(axis=2))))
 
 

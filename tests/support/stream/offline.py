@@ -8,6 +8,7 @@ import numpy as np
 
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.live.feet import LiveFeet
+from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import Sample
 from dynakin.stream.session import Live
 
@@ -25,11 +26,9 @@ def offline_states(
     order = [names.index(name) for name in initial.recorded_markers]
     feet = seen_live(live, time, names, markers, wrench) if wrench.ndim == 3 else None
     total = wrench.sum(axis=1) if wrench.ndim == 3 else wrench
+    ground = initial.ground
     arrays = offline.run_arrays(
-        time,
-        initial.ground.points_to_ground(markers[:, order]),
-        initial.ground.wrench_to_ground(total),
-        feet=feet,
+        Measurements(time, ground.points_to_ground(markers[:, order]), ground.wrench_to_ground(total), feet)
     )
     return np.asarray(arrays["state"])
 

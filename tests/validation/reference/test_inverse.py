@@ -77,7 +77,9 @@ def test_a_joint_stays_within_its_range(ready: Prepared) -> None:
 
 def test_no_other_posture_is_nearer_to_the_markers(ready: Prepared) -> None:
     """The gradient of the squared distances vanishes: an oracle that knows nothing of how the least was sought."""
-    markers = ready.markers[60:70] + np.random.default_rng(2).normal(0.0, 0.005, ready.markers[60:70].shape)
+    markers = ready.measured.markers[60:70] + np.random.default_rng(2).normal(
+        0.0, 0.005, ready.measured.markers[60:70].shape
+    )
     found, model = inverse_kinematics(ready.calibrated, markers), fixed_model(ready.calibrated)
     state = np.zeros(model.layout.size)
 
@@ -93,11 +95,11 @@ def test_no_other_posture_is_nearer_to_the_markers(ready: Prepared) -> None:
 
 def test_wrench_and_moments_are_near_the_simulated_truth(simulated: SimulatedTrial, ready: Prepared) -> None:
     """Sensors without errors: what is left is the calibration's and the table's."""
-    motion = rigid_motions(ready.calibrated, ready.recording.time, ready.markers, (6.0,))[6.0]
-    assert ready.contacts is not None
+    motion = rigid_motions(ready.calibrated, ready.recording.time, ready.measured.markers, (6.0,))[6.0]
+    assert ready.measured.contacts is not None
     external = np.zeros((len(motion.states), len(motion.model.segment_names), 6))
-    for k, segment in enumerate(ready.contacts.segments[:2]):
-        external[:, motion.model.segment_names.index(segment)] = ready.contacts.wrench[:, k]
+    for k, segment in enumerate(ready.measured.contacts.segments[:2]):
+        external[:, motion.model.segment_names.index(segment)] = ready.measured.contacts.wrench[:, k]
     truth, inner = simulated.truth.data, slice(25, -25)
     names = motion.model.coordinate_names
     columns = [names.index(name) for name in FLEXION]

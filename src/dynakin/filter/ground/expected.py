@@ -80,26 +80,32 @@ class Prior(NamedTuple):
     spread: Array
 
 
-def expected_loads(
-    loads: FootLoads,
-    initial: CalibratedModel,
-    noise: Noise,
-    paths: Array,
-    undeclared: Flags,
-    bears: Flags,
-    shear: Shear = NO_SHEAR,
-    off_gain: Array | None = None,
-) -> ContactLoads:
+class Bearing(NamedTuple):
+    """What bears the person: feet, the C declared contacts, or something else.
+
+    Attributes:
+        loads: of each foot, by the plates.
+        undeclared: (T,) frames in which something else bears the person.
+        bears: (T, C) frames in which a declared contact may bear; where plates measure it, these say.
+        shear: by how much more than usual the plates' horizontal forces may be off.
+        off_gain: (T, F) part of its load by which the plate under each foot may be off; None: none is.
+    """
+
+    loads: FootLoads
+    undeclared: Flags
+    bears: Flags
+    shear: Shear = NO_SHEAR
+    off_gain: Array | None = None
+
+
+def expected_loads(bearing: Bearing, initial: CalibratedModel, noise: Noise, paths: Array) -> ContactLoads:
     """The feet's wrenches, those of the declared contacts and, last, the residual: what neither they nor the model
     explain, on the root.
 
     Args:
-        paths: (T, 1 + C, 3) m, where the root is and where the C declared contacts act (`ContactPaths`).
-        undeclared: (T,) frames in which something else bears the person.
-        bears: (T, C) frames in which a declared contact may bear; where plates measure it, these say.
-        shear: by how much more than usual the plates' horizontal forces may be off.
-        off_gain: (T, F) part of its load by which the plate under each foot may be off; not given: none is.
+        paths: (T, 1 + C, 3) m, where the root is and where the declared contacts act (`ContactPaths`).
     """
+    loads, undeclared, bears, shear, off_gain = bearing
     weight, root, C = initial.weighed_kg * GRAVITY_M_S2, paths[:, 0], len(initial.contacts)
     feet = _CONTACT[loads.reason]
     frames, F = feet.shape

@@ -24,6 +24,7 @@ from dynakin.filter.ground.declared import (
     low_beside_feet,
     taken_in_words,
 )
+from dynakin.filter.ground.expected import Bearing
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.on_ground import OnGround
@@ -78,6 +79,12 @@ class Ground:
     clock_sd_s: float = 0.0
     in_hands_kg: float = 0.0
     doubt: Message | None = None
+
+    def bearing(self) -> Bearing | None:
+        """What bears the person; None of a model that stands on its root."""
+        if self.loads is None:
+            return None
+        return Bearing(self.loads, self.undeclared, self.bears, self.shear, self.off_gain)
 
 
 def judged(on: OnGround) -> tuple[Ground, Array]:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from dynakin.filter.alignment import run_in_step
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.samples import in_step
+from dynakin.filter.measurements import Measurements
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.times import step_of
@@ -93,8 +93,9 @@ def prepare(recording: Recording, estimator: Estimator, *, static: Recording | N
     tracker = estimator.start(initial)
     markers, wrench, _ = estimator.measured(recording, tracker.calibrated)
     if _doubts(estimator.noise):
-        _, arrays, shift, _ = run_in_step(tracker, recording.time, markers, wrench)
-        wrench = in_step(recording.time, wrench, shift) if shift else wrench
+        measured = Measurements(recording.time, markers, wrench)
+        _, arrays, shift, _ = run_in_step(tracker, measured)
+        wrench = measured.in_step(shift).wrench
         refused = arrays["verdicts"] == REFUSED
         refused[arrays["tracking"] != FOLLOWING] = True
         markers, wrench = markers.copy(), wrench.copy()
