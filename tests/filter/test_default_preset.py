@@ -107,7 +107,7 @@ def test_what_only_describes_live_estimates_is_no_headline_of_a_smoothed_one(
     assert "Adaptation" not in after and compute_metrics(smoothed)["adaptation"]["verdict"] == ""
     assert "Speeds" not in after and after["One frame ahead"].level in ("good", "note")
     for found in (live, after):  # true of both: it is the filter's covariance
-        assert found["Uncertainty"].level == "good" and "fit this recording" in found["Uncertainty"].text
+        assert found["Uncertainty"].level == "good" and "this recording" in found["Uncertainty"].text
     assert "Settled" not in " ".join(i.text for i in after.values())
 
 

@@ -41,8 +41,8 @@ def print_summary(result: Result, folder: Path) -> None:
         console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
 
 
-ALWAYS = ("Uncertainty", "Adaptation")
-"""Those that are said where they are no warning too."""
+NOTED = ("Uncertainty", "Adaptation")
+"""Those whose notes are said in the verdict too; where they have nothing against a run they are on the page alone."""
 
 
 def _print_verdict(console: Console, found: list[Insight], reasons: Sequence[str]) -> None:
@@ -51,7 +51,7 @@ def _print_verdict(console: Console, found: list[Insight], reasons: Sequence[str
     Args:
         reasons: sentences that stand above, with the moments.
     """
-    said = [in_short(found), *(each.text for each in found if each.title in ALWAYS and each.level != "warning")]
+    said = [in_short(found), *(each.text for each in found if each.title in NOTED and each.level == "note")]
     warned = [each for each in found if each.level == "warning"]
     console.print(f"Verdict: {' '.join(said)}", style="yellow" if warned else "green")
     for each in warned:

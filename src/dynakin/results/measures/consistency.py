@@ -244,8 +244,11 @@ def _verdict(judgements: Mapping[str, Judgement], noise: NoiseFrom) -> str:
             "are not the worse for it."
         )
     if not parts and said:
-        to_it = ", to which the noise was calibrated" if noise == "calibrated" else ""
-        parts.append(f"The standard deviations fit this recording{to_it}.")
+        parts.append(
+            "The noise was calibrated on this recording, whose innovations do not contradict the standard deviations."
+            if noise == "calibrated"  # innovations are then of the expected size, whatever the errors are
+            else "The standard deviations fit this recording."
+        )
     return " ".join(parts) or "Innovations were kept without their covariances, so the deviations are not judged."
 
 
