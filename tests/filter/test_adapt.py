@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.filter.adapt import LATE_SHARE, LEAST_FRAMES, calibrated_noise, frames_that_show, nis_per_row
+from dynakin.filter.adapt import LEAST_FRAMES, calibrated_noise, frames_that_show, nis_per_row
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.noise import joint_groups
+from dynakin.filter.noise import LATE_SHARE, joint_groups
 from dynakin.filter.prepared import Prepared
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.contact import UNMEASURED

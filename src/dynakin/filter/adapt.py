@@ -16,7 +16,7 @@ import numpy.typing as npt
 from dynakin.errors import DivergenceError
 from dynakin.filter.augment import continuous_noise
 from dynakin.filter.measurements import Measurements
-from dynakin.filter.noise import joint_groups
+from dynakin.filter.noise import LATE_SHARE, MOVED_S, SETTLING_S, joint_groups
 from dynakin.filter.tracker import Tracker
 from dynakin.progress import Progress
 from dynakin.results.measures.tracking import ANY_ASTRAY
@@ -31,11 +31,9 @@ CALIBRATED_S = 4.0
 10 s give factors within 2 % of each other."""
 SHOWN_S = 10.0
 """The first run, which shows how large innovations are, goes over so much of the recording at least,"""
-MOVES, MOVED_S = 0.8, 0.1
+MOVES = 0.8
 """and over as much more as it takes until markers have moved by so much of what they do in all of it (mean square of
-their way in so many seconds): who stands for a while shows little."""
-SETTLING_S = 0.3
-"""Left out of it: the first frames' covariances are the priors'."""
+their way in `MOVED_S`): who stands for a while shows little."""
 LEAST_FRAMES = 25
 """Fewer say nothing: a quarter of a second."""
 LEAST_SHARE = 0.5
@@ -46,9 +44,6 @@ OTHER_JERK_SHARE = 0.5
 """Part of a jerk scale's logarithm that is believed: jerk is not white, and what fits the next frame best is too little
 for a step. Of feet all of it: what is kept back there turns up as ankles that are off by a constant (`truth3d`); and of
 what turns the trunk about its length, which was cut at 5 to 8 Hz (`truth3d`'s walks 3, 31, two of other persons)."""
-LATE_SHARE = 0.8
-"""Part of the factor's logarithm that is believed of estimates without any lag: they are late where accelerations
-change, which the next frame hardly shows."""
 
 
 def frames_that_show(time: Array, markers: Array) -> int:

@@ -15,6 +15,14 @@ from dynakin.settings.noise import JointGroup, Noise
 
 Array = npt.NDArray[np.float64]
 
+MOVED_S = 0.1
+"""Over which the way of markers says how much somebody moves, where noise is found in innovations."""
+SETTLING_S = 0.3
+"""Left out there: the first frames' covariances are the priors'."""
+LATE_SHARE = 0.8
+"""Part of the found factor's logarithm that is believed of estimates without any lag: they are late where accelerations
+change, which the next frame hardly shows."""
+
 
 def process_variance(noise: Noise, layout: _core.StateLayout) -> Array:
     """Diagonal of Q (n,) a step, in the order of the state."""

@@ -112,6 +112,12 @@ class Systematic:
             k for k, name in enumerate(calibrated.names) if self.sizes.inertia and name.startswith("inertia/")
         ]
 
+    def at_scale(self, variance_scale: float) -> Systematic:
+        """The same beside a filter's own deviations that are by this ``variance_scale``."""
+        other = copy(self)
+        other._variance_scale = variance_scale
+        return other
+
     def with_found(
         self, clock_sd_s: float, in_hands_kg: float = 0.0, skin: float = 0.0, hips_turned: float = np.inf
     ) -> Systematic:

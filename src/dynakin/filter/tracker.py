@@ -12,9 +12,11 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
+from dynakin.filter.augment import variance_scales
 from dynakin.filter.contacts import ContactLoads, stands_off_plates
 from dynakin.filter.core_filter import core_filter, smoothed
 from dynakin.filter.live.feet import LiveFeet
+from dynakin.filter.live.found_noise import FoundNoise
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.noise import prior_factor
 from dynakin.filter.reported_sd import BLOCKS, as_believed
@@ -94,6 +96,7 @@ class Tracker:
         self._time: float | None = None
         self._latest: StepEstimate | None = None
         self._stepped: deque[_Stepped] = deque(maxlen=lag + 2)  # and the one before, by which loads change
+        self._found = FoundNoise(late=lag > 0) if noise.calibrates(bool(calibrated.feet)) else None
         self._off_plates = False  # whether some foot has stood off the plates
 
     def fresh(self) -> Tracker:
@@ -131,6 +134,13 @@ class Tracker:
         for a model that is fixed in the ground: its lengths are states that drift, and its own deviations hold."""
         wanted = self.noise.systematic_scale and self.calibrated.feet
         return Systematic(self.calibrated, self.noise) if wanted else None
+
+    @property
+    def found_noise(self) -> Noise:
+        """The noise with the factor on its variances that innovations have shown until now (`FoundNoise`): deviations
+        go by it, the movement does not."""
+        shown = 1.0 if self._found is None else self._found.variance_scale
+        return self.noise.changed(variance_scale=shown * self.noise.variance_scale)
 
     @property
     def latest(self) -> StepEstimate:
@@ -185,6 +195,8 @@ class Tracker:
         if report.diverged:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
+        if self._found is not None:
+            self._found.look(sample.time_s, markers, report)
         unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
         plates_refused = self.verdicts[-1] == "refused"
         sources = self._sources.moments(feet, refused=plates_refused and not unmeasured)[0]
@@ -241,7 +253,7 @@ class Tracker:
 
     def deviations(self, *, delayed: bool = False) -> dict[str, Labelled]:
         """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step. They
-        hold what the filter cannot know, too (`systematic`).
+        are by `found_noise`, and hold what the filter cannot know, too (`systematic`).
 
         Args:
             delayed: those of `delayed` instead, once there is one; they take as long as 0.6 steps for each frame of
@@ -258,11 +270,14 @@ class Tracker:
         if late := delayed and self._with_lag().ready:
             lag = self._with_lag()
             step, state, covariance = self._delayed_step(lag), lag.state, lag.covariance
+        noise, names = self.found_noise, self.calibrated.names
+        root = np.sqrt(variance_scales(names, noise) / variance_scales(names, self.noise))
+        covariance = root[:, None] * covariance * root
         loads = step and step.loads
         found = deviations_of(self.core_model, state, covariance, loads, step and step.plates_sd)
         if step is not None and step.unmeasured:
-            found["moments"] = np.where(step.sources != MEASURED, prior_factor(self.noise), 1.0) * found["moments"]
-            found["wrench"] = (prior_factor(self.noise) if step.blind else 1.0) * found["wrench"]
+            found["moments"] = np.where(step.sources != MEASURED, prior_factor(noise), 1.0) * found["moments"]
+            found["wrench"] = (prior_factor(noise) if step.blind else 1.0) * found["wrench"]
         if self.systematic is not None:
             wrench, rate = np.zeros((0, 6)), None
             if step is not None and step.loads is not None:
@@ -274,7 +289,7 @@ class Tracker:
             sources, used = (None, None) if step is None else (step.sources, step.used)
             if step is not None and not step.unmeasured:  # what is derived has refused plates
                 sources = as_believed(step.sources)
-            found |= self.systematic.added(
+            found |= self.systematic.at_scale(noise.variance_scale).added(
                 found, state, covariance, wrench, segments,
                 sources=sources, off_plates=self._off_plates, late=late, used=used,
                 wrench_rate=rate, step_s=step_of(np.array([each.time_s for each in self._stepped])),

@@ -1,1 +1,2 @@
-"""What is known of the ground at this moment, frame by frame: what `filter.ground` says of a whole recording."""
+"""What is known at this moment, frame by frame: of the ground what `filter.ground` says of a whole recording, of the
+noise what `filter.adapt` does."""

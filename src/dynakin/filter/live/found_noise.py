@@ -1,0 +1,69 @@
+"""How large the noise is of what is declared, as far as a session's innovations have shown it."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.bindings import _core
+from dynakin.filter.noise import LATE_SHARE, MOVED_S, SETTLING_S
+from dynakin.results.records import FOLLOWING, TRACKING
+
+Array = npt.NDArray[np.float64]
+
+MOVES_M_S = 0.3
+"""Speed of markers (root of mean square) from which a frame counts in full: who stands shows the cameras alone."""
+FORGETS_S = 10.0
+"""Of movement, after which a frame counts less by a factor of e."""
+DECLARED_S = 0.5
+"""As much movement counts what is declared: after so much of it half of the factor's logarithm is believed."""
+
+
+class FoundNoise:
+    """The factor on all variances but the plates' with which innovations are of the expected size, over the frames in
+    which somebody moves: for deviations what `adapt.calibrated_noise` finds in a recording. Such a factor leaves the
+    movement as it is estimated, which is why it may change while a session goes on.
+
+    Args:
+        late: whether what is estimated waits for later frames.
+    """
+
+    def __init__(self, *, late: bool) -> None:
+        self._share = 1.0 if late else LATE_SHARE
+        self._seen: deque[tuple[float, Array]] = deque()  # from `MOVED_S` ago on
+        self._begun_s: float | None = None
+        self._squares = self._rows = self._moved_s = 0.0
+
+    def look(self, time_s: float, markers: Array, report: _core.StepReport) -> None:
+        """At what a step says of the markers (M, 3) m, NaN missing, that it took."""
+        dt = time_s - self._seen[-1][0] if self._seen else 0.0
+        self._seen.append((time_s, markers))
+        while len(self._seen) > 2 and time_s - self._seen[1][0] >= MOVED_S:
+            self._seen.popleft()
+        if self._begun_s is None:
+            self._begun_s = time_s
+        following = report.tracking == TRACKING[FOLLOWING] and report.n_rows > 0
+        if not following or dt <= 0.0 or time_s - self._begun_s < SETTLING_S:
+            return
+        weight = min((self._speed() / MOVES_M_S) ** 2, 1.0)
+        kept = float(np.exp(-weight * dt / FORGETS_S))
+        self._squares = kept * self._squares + weight * report.nis
+        self._rows = kept * self._rows + weight * report.n_rows
+        self._moved_s = kept * self._moved_s + weight * dt
+
+    def _speed(self) -> float:
+        """m/s, of the markers that were seen in both frames; 0 without any."""
+        (then_s, then), (now_s, now) = self._seen[0], self._seen[-1]
+        way = np.square(now - then).sum(axis=1)
+        way = way[np.isfinite(way)]
+        return float(np.sqrt(way.mean())) / (now_s - then_s) if len(way) else 0.0
+
+    @property
+    def variance_scale(self) -> float:
+        """1: as declared, which holds until somebody moves."""
+        if not self._squares:
+            return 1.0
+        believed = self._share * self._moved_s / (self._moved_s + DECLARED_S)
+        return float((self._squares / self._rows) ** believed)
