@@ -11,7 +11,7 @@ depend on: trial, noise, package and this file (--again: made anew).
 
 Groups and figures are truth3d's: angles with their mean error taken off, means over coordinates and seeds; deviation
 over error is the median of a group's angles and speeds. --choose searches the sizes of one kind of model over all cases
-asked for; --sizes tries some. What is chosen goes into `filter/error_sizes.py` by hand.
+asked for; --sizes tries some. What is chosen goes into `filter/uncertainty/sizes.py` by hand.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from source_digest import source_digest
 
 import dynakin
 from dynakin.filter.contacts import any_off_plates
-from dynakin.filter.error_sizes import LANDMARKS, SCALED, Sizes, hips_unshown, usual_sizes
-from dynakin.filter.joint_errors import hips_turned
-from dynakin.filter.reported_sd import BLOCKS, Parts, reported
-from dynakin.filter.skin import skin_found
-from dynakin.filter.systematic import Systematic
+from dynakin.filter.uncertainty.reported import BLOCKS, Parts, reported
+from dynakin.filter.uncertainty.sizes import LANDMARKS, SCALED, Sizes, hips_unshown, usual_sizes
+from dynakin.filter.uncertainty.skin import skin_found
+from dynakin.filter.uncertainty.systematic import Systematic
+from dynakin.filter.uncertainty.upright import hips_turned
 from dynakin.model.definition import load_model
 from dynakin.recordings.times import step_of
 from dynakin.results.estimate import values_of

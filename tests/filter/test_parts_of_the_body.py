@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from dynakin.filter import systematic
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.uncertainty import systematic
 from dynakin.messages import about
 from dynakin.model.definition import load_model
 from dynakin.recordings.recording import Recording

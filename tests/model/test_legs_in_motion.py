@@ -13,9 +13,9 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError
-from dynakin.filter.error_sizes import LANDMARKS, ONE_SIDED, UNMARKED, less_sure_joints, usual_sizes
 from dynakin.filter.estimator import Tracked
-from dynakin.filter.systematic import Systematic
+from dynakin.filter.uncertainty.sizes import LANDMARKS, ONE_SIDED, UNMARKED, less_sure_joints, usual_sizes
+from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.messages import about
 from dynakin.model.definition import load_model
 from dynakin.model.plan import SUPPOSED_AXIS

@@ -13,7 +13,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.live.feet import LiveFeet
-from dynakin.filter.reported_sd import OWN_AT_ONCE
+from dynakin.filter.uncertainty.reported import OWN_AT_ONCE
 from dynakin.model.markers.recognise import recognise
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import ON_PLATE, SHARED_PLATE, UNMEASURED

@@ -17,12 +17,12 @@ from dynakin.filter.core_filter import core_filter, smoothed
 from dynakin.filter.live.feet import LiveFeet
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.noise import prior_factor
-from dynakin.filter.reported_sd import BLOCKS, as_believed
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sight import LiveSight
 from dynakin.filter.sources import ContactSources
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
-from dynakin.filter.systematic import Systematic
+from dynakin.filter.uncertainty.reported import BLOCKS, as_believed
+from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED

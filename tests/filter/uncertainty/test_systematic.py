@@ -15,10 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates
-from dynakin.filter.error_sizes import KINDS, LANDMARKS, OF_JOINTS, SCALED, SHOWS_HIPS_RAD, Sizes, usual_sizes
-from dynakin.filter.in_hands import HANDS, Hands
-from dynakin.filter.joint_errors import OF_ROOT, JointErrors, hips_turned, neutral, trunks_of
-from dynakin.filter.reported_sd import (
+from dynakin.filter.uncertainty.in_hands import HANDS, Hands
+from dynakin.filter.uncertainty.joint_errors import OF_ROOT, JointErrors
+from dynakin.filter.uncertainty.reported import (
     BLOCKS,
     OWN_AT_ONCE,
     OWN_LATE,
@@ -28,7 +27,9 @@ from dynakin.filter.reported_sd import (
     movement_intensity,
     reported,
 )
-from dynakin.filter.systematic import _STEP_S, ROOT_SKIN, Systematic
+from dynakin.filter.uncertainty.sizes import KINDS, LANDMARKS, OF_JOINTS, SCALED, SHOWS_HIPS_RAD, Sizes, usual_sizes
+from dynakin.filter.uncertainty.systematic import _STEP_S, ROOT_SKIN, Systematic
+from dynakin.filter.uncertainty.upright import hips_turned, neutral, trunks_of
 from dynakin.model.calibration.calibrated import Provenance
 from dynakin.model.calibration.declared import with_loads
 from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD

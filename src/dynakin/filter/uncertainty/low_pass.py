@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms
-from dynakin.filter.reported_sd import BLOCKS
-from dynakin.filter.systematic import Systematic
+from dynakin.filter.uncertainty.reported import BLOCKS
+from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.low_passed import LowPass
 from dynakin.results.estimate import values_of

@@ -18,12 +18,21 @@ from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import any_off_plates, late_by, rates, wrenches_of
-from dynakin.filter.error_sizes import CENTRES, KINDS, OF_JOINTS, Sizes, hips_unshown, less_sure_joints, usual_sizes
-from dynakin.filter.in_hands import Hands
-from dynakin.filter.joint_errors import OF_ROOT, JointErrors, drives, floats, neutral, rolls, trunks_of
-from dynakin.filter.limbs import unseen_limbs, unsure_moments
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
-from dynakin.filter.reported_sd import BLOCKS, Parts, as_believed, movement_intensity, reported
+from dynakin.filter.uncertainty.in_hands import Hands
+from dynakin.filter.uncertainty.joint_errors import OF_ROOT, JointErrors
+from dynakin.filter.uncertainty.reported import BLOCKS, Parts, as_believed, movement_intensity, reported
+from dynakin.filter.uncertainty.sizes import (
+    CENTRES,
+    KINDS,
+    OF_JOINTS,
+    Sizes,
+    hips_unshown,
+    less_sure_joints,
+    usual_sizes,
+)
+from dynakin.filter.uncertainty.unseen_limbs import unseen_limbs, unsure_moments
+from dynakin.filter.uncertainty.upright import drives, floats, neutral, rolls, trunks_of
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.error_sizes import CENTRES, KINDS, Sizes
+from dynakin.filter.uncertainty.sizes import CENTRES, KINDS, Sizes
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
 
 Array = npt.NDArray[np.float64]
