@@ -1,6 +1,7 @@
-"""How sure the filter's estimate is, with what the filter cannot know.
+"""How sure an estimate is, with what the filter cannot know.
 
-`systematic` works out, by kind of error, what joints, skin, limbs, centres of mass and loads that are not as the model
-has them do to what is estimated; `sizes` says how large these errors are, `reported` adds them to the part of the
-filter's own variance that holds for the movement. `low_pass` widens what somebody has low-passed before.
+`frames` is what that is worked out from, of a recording as of a live session. Each kind of error has a class that says
+what errors of size 1 do in a frame: `joints`, `skin`, `mass_centres`, `loads`, `inertia`; `sizes` says how large they
+are. `systematic` adds them up, and `reported` with the part of the filter's own variance that holds for the movement.
+`low_pass` widens that where the markers were low-passed before.
 """
