@@ -11,7 +11,7 @@ depend on: trial, noise, package and this file (--again: made anew).
 
 Groups and figures are truth3d's: angles with their mean error taken off, means over coordinates and seeds; deviation
 over error is the median of a group's angles and speeds. --choose searches the sizes of one kind of model over all cases
-asked for; --sizes tries some. What is chosen goes into `filter/error_sizes.py` by hand.
+asked for; --sizes tries some. What is chosen goes into `filter/uncertainty/sizes.py` by hand.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from scipy.optimize import minimize
 from source_digest import source_digest
 
 import dynakin
-from dynakin.filter.contacts import any_off_plates
-from dynakin.filter.error_sizes import LANDMARKS, SCALED, Sizes, hips_unshown, usual_sizes
-from dynakin.filter.joint_errors import hips_turned
-from dynakin.filter.reported_sd import BLOCKS, Parts, reported
-from dynakin.filter.skin import skin_found
-from dynakin.filter.systematic import Systematic
+from dynakin.filter.uncertainty.frames import Frames
+from dynakin.filter.uncertainty.geometry import BLOCKS, Parts
+from dynakin.filter.uncertainty.reported import Own, reported
+from dynakin.filter.uncertainty.sizes import LANDMARKS, SCALED, Sizes, hips_unshown, usual_sizes
+from dynakin.filter.uncertainty.skin import skin_found
+from dynakin.filter.uncertainty.systematic import Systematic
+from dynakin.filter.uncertainty.upright import hips_turned
 from dynakin.model.definition import load_model
-from dynakin.recordings.times import step_of
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import MEASURED, moment_sources
 from dynakin.settings import presets
@@ -63,9 +63,7 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
-    error at size 1; (T,) intensity of the movement and how far markers are moved; (T, C) where moments come from,
-    and whether some foot stands off the plates. Frames that have no truth or no value are NaN. ``late``: whether
-    later frames helped. ``skin``: as of `skin_found`. ``hips``: as of
+    error at size 1. Frames that have no truth or no value are NaN. ``skin``: as of `skin_found`. ``hips``: as of
     `hips_unshown`."""
 
     case: str
@@ -73,15 +71,8 @@ class Run:
     sizes: str
     names: tuple[str, ...]
     error: dict[str, Array]
-    own: dict[str, Array]
+    own: Own
     parts: Parts
-    intensity: Array
-    sources: Array
-    off_plates: bool
-    variance_scale: float
-    moved_m: Array
-    late: bool
-    step_s: float
     skin: float
     hips: float
 
@@ -165,7 +156,9 @@ def against(
     data, tracker = tracked.estimate.data, tracked.tracker
     sizes = replace(usual_sizes(tracker.calibrated), inertia=True)  # worked out where it is not in use, too
     systematic = Systematic(tracker.calibrated, tracker.noise, sizes)
-    parts = systematic.over_time(data)
+    late = bool(tracked.estimate.config["lag_s"])
+    frames = Frames.of(data, len(tracker.calibrated.feet), tracker.noise.variance_scale, late=late)
+    own, parts = systematic.own(frames), systematic.parts(frames)
     all_names = [str(n) for n in data["coordinate"].values]
     chosen = [n for n in all_names if n in names and n not in tracked.estimate.held]
     mine, theirs = [all_names.index(n) for n in chosen], [names.index(n) for n in chosen]
@@ -175,24 +168,23 @@ def against(
         found: Array = data[name].transpose("time", "coordinate").values[window][:, mine]
         return found
 
-    sources = moment_sources(data)[window][:, mine]
+    here = np.ix_(window, np.array(mine))
     error = {block: values(block) - truth[block][window][:, theirs] for block in blocks}
-    error["moments"] = np.where(sources == MEASURED, error["moments"], np.nan)
+    error["moments"] = np.where(moment_sources(data)[here] == MEASURED, error["moments"], np.nan)
     return Run(
         case,
         seed,
         "none" if case in PLANAR else "scaled" if tracker.calibrated.plan is None else "landmarks",
         tuple(chosen),
         error,
-        {block: values(f"{block}_sd") for block in blocks},
-        {kind: {block: part[block][window][:, mine] for block in blocks} for kind, part in parts.items()},
-        systematic.intensity(data)[window],
-        sources,
-        any_off_plates(data, len(tracker.calibrated.feet)),
-        tracker.noise.variance_scale,
-        systematic.moved_m(values_of(data, "state"))[window],
-        bool(tracked.estimate.config["lag_s"]),
-        step_of(data["time"].values),
+        replace(
+            own,
+            sd={block: own.sd[block][here] for block in blocks},
+            intensity=own.intensity[window],
+            moved_m=own.moved_m[window],
+            sources=own.sources[here],
+        ),
+        {kind: {block: part[block][here] for block in blocks} for kind, part in parts.items()},
         skin_found(tracker.calibrated, {name: data[name].values for name in ("state", "tracking")}),
         hips_unshown(hips_turned(tracker.calibrated, values_of(data, "state"))),
     )
@@ -219,13 +211,9 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     """By group: share inside 95 %, deviation over error, error and deviation (RMS; rad, rad/s, N m); None: the filter's
     own deviations."""
     found = {}
-    said = run.own
+    said = run.own.sd
     if sizes is not None:
-        over_time = run.intensity, run.moved_m, run.sources
-        said = reported(
-            replace(sizes, hips=run.hips).with_skin(run.skin), run.variance_scale, run.own, run.parts, *over_time,
-            off_plates=run.off_plates, late=run.late, step_s=run.step_s,
-        )  # fmt: skip
+        said = reported(run.own, replace(sizes, hips=run.hips).with_skin(run.skin), run.parts)
     for title, block, places in groups_of(run):
         e, sd = run.error[block][:, places], said[block][:, places]
         if block == "coordinates":

@@ -16,6 +16,8 @@ from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import Sample, marker_paths, total_wrench
 from dynakin.filter.sources import ContactSources
 from dynakin.filter.tracker import Tracker
+from dynakin.filter.uncertainty.frames import Frames
+from dynakin.filter.uncertainty.geometry import Blocks
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.recording import Recording
@@ -112,6 +114,24 @@ def test_moments_are_less_sure_by_the_clock_while_loads_change_late_as_at_once()
         live.systematic.sizes = replace(live.systematic.sizes, clock=0.002)
         ankle = [coordinate.name for coordinate in live.calibrated.spec.coordinates].index("ankle_angle_l")
         assert with_clock[ankle] > without[ankle] > 0.0
+
+
+def test_a_session_knows_constants_by_the_declared_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.1)
+    model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
+    live = Estimator(model, presets.default().changed(variance_scale=0.2)).start(recording)
+    live.step(_samples(recording)[0])
+    assert live.systematic is not None
+    added = live.systematic.added
+
+    def seen(frames: Frames) -> Blocks:
+        np.testing.assert_array_equal(frames.known_sd, 1.0)
+        np.testing.assert_array_equal(frames.known, live.covariance / 0.2)
+        return {block: 2.0 * sd for block, sd in added(frames).items()}
+
+    before = live.deviations()["speeds"].values
+    monkeypatch.setattr(live.systematic, "added", seen)
+    np.testing.assert_array_equal(live.deviations()["speeds"].values, 2.0 * before)
 
 
 def test_a_limb_that_nobody_sees_is_absent_from_the_fifth_of_a_second_on() -> None:

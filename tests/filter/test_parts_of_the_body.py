@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from dynakin.filter import systematic
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.uncertainty import mass_centres
 from dynakin.messages import about
 from dynakin.model.definition import load_model
 from dynakin.recordings.recording import Recording
@@ -153,7 +153,7 @@ def test_arms_that_no_marker_shows_make_the_back_less_sure(
     assert np.mean(np.abs(error) < 1.96 * sd) > 0.9
     assert not about(found.messages, "place")
     legs = {name: of(found, "moments_sd", name).mean() for name in ("hip_flexion_r", "knee_angle_r")}
-    monkeypatch.setattr(systematic, "unseen_limbs", lambda calibrated: [])
+    monkeypatch.setattr(mass_centres, "unseen_limbs", lambda calibrated: [])
     before = estimated(without(squat.recording, arm))
     assert sd.mean() > 1.4 * of(before, "moments_sd", "lumbar_extension").mean()
     for name, sd_nm in legs.items():  # the plates give those

@@ -7,9 +7,10 @@ import pytest
 
 from dynakin.bindings import _core
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.joint_errors import followed
-from dynakin.filter.skin import following_skin, skin_found
+from dynakin.filter.following_skin import following_skin
 from dynakin.filter.tracker import Tracker
+from dynakin.filter.uncertainty.skin import skin_found
+from dynakin.filter.uncertainty.upright import followed
 from dynakin.model.definition import load_model
 from dynakin.results.records import FOLLOWING
 from dynakin.settings.noise import Noise

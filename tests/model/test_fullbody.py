@@ -9,8 +9,8 @@ import pytest
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
-from dynakin.filter.error_sizes import LANDMARKS, ONE_SIDED, SINCE_CENTRE, less_sure_joints
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.uncertainty.sizes import LANDMARKS, ONE_SIDED, SINCE_CENTRE, less_sure_joints
 from dynakin.model.calibration.how import Calibration
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.contact import SHARED_PLATE

@@ -13,9 +13,10 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError
-from dynakin.filter.error_sizes import LANDMARKS, ONE_SIDED, UNMARKED, less_sure_joints, usual_sizes
 from dynakin.filter.estimator import Tracked
-from dynakin.filter.systematic import Systematic
+from dynakin.filter.uncertainty.geometry import Geometry
+from dynakin.filter.uncertainty.joints import Joints
+from dynakin.filter.uncertainty.sizes import LANDMARKS, ONE_SIDED, UNMARKED, less_sure_joints, usual_sizes
 from dynakin.messages import about
 from dynakin.model.definition import load_model
 from dynakin.model.plan import SUPPOSED_AXIS
@@ -159,8 +160,8 @@ def test_a_joint_with_a_lateral_marker_alone_is_less_sure() -> None:
     assert both.plan is not None and one.plan is not None
     axes = [each.plan.prior(Priors())["length/knee_axis_r"] for each in (both, one)]
     assert axes == pytest.approx([0.05, SUPPOSED_AXIS * 0.05])  # it is laid between pelvis and foot
-    moments = [Systematic(each, Noise()) for each in (both, one)]
-    assert [each._times.max() for each in moments] == [1.0, ONE_SIDED]
+    joints = [Joints(Geometry(each, Noise()), each, Noise()) for each in (both, one)]
+    assert [each._times.max() for each in joints] == [1.0, ONE_SIDED]
 
 
 def without_toes(recording: Recording) -> Recording:

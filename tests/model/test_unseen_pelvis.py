@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from dynakin.filter.error_sizes import OF_HIPS, less_sure_joints
+from dynakin.filter.uncertainty.sizes import OF_HIPS, less_sure_joints
 from dynakin.messages import about
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import load_model

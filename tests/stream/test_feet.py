@@ -13,7 +13,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.live.feet import LiveFeet
-from dynakin.filter.reported_sd import OWN_AT_ONCE
+from dynakin.filter.uncertainty.reported import OWN_AT_ONCE
 from dynakin.model.markers.recognise import recognise
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import ON_PLATE, SHARED_PLATE, UNMEASURED
@@ -164,7 +164,7 @@ def test_smoothed_moments_and_bands_are_those_with_the_feet(
     deviations = [f.deviations["moments"][knees] for f in frames if f.deviations is not None]
     assert deviations and np.all(np.array(deviations) > 0.0)
     model, x, P = live.tracker.core_model, live.tracker.state, live.tracker.covariance
-    loads = live.tracker._stepped[-1].loads
+    loads = live.tracker._steps.last.loads
     assert loads is not None
     found = live.tracker.found_noise  # by whose factor all variances here are scaled
     assert found.variance_scale < 0.5
@@ -181,13 +181,13 @@ def test_smoothed_moments_and_bands_are_those_with_the_feet(
 
 def test_the_total_wrench_is_what_the_feet_give(squat: tuple[Live, list[LiveFrame], list[str]]) -> None:
     tracker, frames = squat[0].tracker, squat[1]
-    model, x, step = tracker.core_model, tracker.state, tracker._stepped[-1]
+    model, x, step = tracker.core_model, tracker.state, tracker._steps.last
     assert step.loads is not None and step.plates_sd is not None and tracker.systematic is not None
     given = _core.contact_moments(model, x, step.loads)["foot_wrench"]
     np.testing.assert_allclose(frames[-1].estimate.wrench, given[:-1].sum(axis=0))
     assert np.abs(given[-1]).max() > 0.1  # what the movement needs beside it
-    rate = tracker._wrench_rate(step, x, given)
-    assert rate is not None
+    wrench, rate = tracker._steps.wrenches(step, x)
+    np.testing.assert_array_equal(wrench, given)
     late = tracker.systematic.sizes.clock * rate[:-1].sum(axis=0)
     sd = tracker.deviations()["wrench"].values
     P = tracker.found_noise.variance_scale * tracker.covariance

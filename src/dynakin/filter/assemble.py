@@ -21,9 +21,9 @@ from dynakin.filter.noise import limit_sd, prior_factor
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sight import hidden_segments
 from dynakin.filter.sources import ContactSources, with_sources
-from dynakin.filter.systematic import Systematic
-from dynakin.filter.taken import with_taken
 from dynakin.filter.tracker import Tracker
+from dynakin.filter.uncertainty.low_pass import with_taken
+from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates

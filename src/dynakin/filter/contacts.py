@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -14,11 +14,9 @@ from dynakin.errors import ModelError
 from dynakin.filter.samples import in_step
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.times import step_of
-from dynakin.results.estimate import values_of
-from dynakin.results.measures.sources import MEASURED, wrench_sources
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
@@ -220,45 +218,6 @@ def _joint(each: Array) -> Array:
     return joint.reshape(frames, 6 * count, 6 * count)
 
 
-def wrenches_of(data: xr.Dataset) -> tuple[Array, list[str]]:
-    """Wrenches (T, F, 6) of the contacts and their segments; none where the model has no contacts."""
-    if "foot_wrench" not in data:
-        return np.zeros((len(data["time"]), 0, 6)), []
-    return np.nan_to_num(values_of(data, "foot_wrench")), [str(name) for name in data["foot_segment"].values]
-
-
-def rates(wrench: Array, time: Array) -> Array:
-    """By how much wrenches (T, ...) change, a second, from sample to sample (a load passes from foot to foot within
-    one); 0 beside what is not known."""
-    return np.nan_to_num(np.gradient(wrench, time, axis=0)) if len(time) > 1 else np.zeros_like(wrench)
-
-
-def late_by(data: xr.Dataset, clock_sd_s: float) -> dict[str, Any]:
-    """Deviations of the contacts' wrenches, and of their sum where that is measured, with a clock of the plates that is
-    off by so much: what acts later is off by that times its change, as in moments. No plate's clock is in what none
-    measures."""
-    time = np.asarray(data["time"].values)
-    found: dict[str, Any] = {}
-    if "foot_wrench_sd" in data:
-        unmeasured = (values_of(data, "foot_contact") == UNMEASURED)[..., None]
-        late = clock_sd_s * rates(np.where(unmeasured, np.nan, values_of(data, "foot_wrench")), time)
-        found["foot_wrench_sd"] = (("time", "foot", "component"), np.hypot(values_of(data, "foot_wrench_sd"), late))
-    if "wrench_sd" in data:
-        late = clock_sd_s * rates(values_of(data, "wrench_estimated"), time)
-        late = np.where(wrench_sources(data) == MEASURED, late, 0.0)
-        found["wrench_sd"] = (("time", "component"), np.hypot(values_of(data, "wrench_sd"), late))
-    return found
-
-
-def any_off_plates(data: xr.Dataset, feet: int) -> bool:
-    """Whether some foot stands off the plates in a frame of a recording.
-
-    Args:
-        feet: how many of the contacts are feet: the first ones, declared ones follow.
-    """
-    return "foot_contact" in data and stands_off_plates(values_of(data, "foot_contact"), feet)
-
-
 def stands_off_plates(contact: npt.NDArray[np.uint8], feet: int) -> bool:
-    """The same of contacts (T, F)."""
+    """Whether some foot stands off the plates, by contacts (T, F) of which the first are feet."""
     return bool((contact[:, :feet] == UNMEASURED).any())

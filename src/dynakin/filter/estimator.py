@@ -17,13 +17,13 @@ from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.ground.judged import Ground
 from dynakin.filter.ground.known import known_ground
 from dynakin.filter.ground.place import off_place
-from dynakin.filter.joint_errors import hips_turned
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.passes import passes
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import marker_paths, total_wrench
-from dynakin.filter.skin import skin_found
 from dynakin.filter.tracker import Tracker
+from dynakin.filter.uncertainty.skin import skin_found
+from dynakin.filter.uncertainty.upright import hips_turned
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.declared import with_contacts, with_loads
 from dynakin.model.calibration.how import Calibration

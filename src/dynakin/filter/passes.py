@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from dynakin.filter.adapt import CALIBRATED_S, calibrated_noise, frames_that_show
 from dynakin.filter.alignment import PASSES, run_in_step
+from dynakin.filter.following_skin import following_skin, may_follow
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.prepared import Prepared
-from dynakin.filter.skin import following_skin, may_follow
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note
 from dynakin.progress import Progress

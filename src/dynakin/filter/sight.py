@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
-from dynakin.filter.joint_errors import floats
+from dynakin.filter.uncertainty.upright import floats
 from dynakin.results.measures.sources import LEAST_OF_ROOT, Hidden, in_use, out_of_sight, taken_back, too_long
 from dynakin.results.records import REFUSED
 from dynakin.tree import Tree

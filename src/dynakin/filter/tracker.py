@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Collection, Mapping
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,41 +16,23 @@ from dynakin.filter.contacts import ContactLoads, stands_off_plates
 from dynakin.filter.core_filter import core_filter, smoothed
 from dynakin.filter.live.feet import LiveFeet
 from dynakin.filter.live.found_noise import FoundNoise
+from dynakin.filter.live.steps import Stepped, Steps
 from dynakin.filter.measurements import Measurements
-from dynakin.filter.noise import prior_factor
-from dynakin.filter.reported_sd import BLOCKS, as_believed
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sight import LiveSight
 from dynakin.filter.sources import ContactSources
-from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
-from dynakin.filter.systematic import Systematic
+from dynakin.filter.step import Labelled, Labels, StepEstimate, step_estimate
+from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
-from dynakin.recordings.times import step_of
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
+from dynakin.results.measures.sources import ABSENT, DERIVED
 from dynakin.results.records import NO_ESTIMATE
 from dynakin.settings.lag import check_can_smooth
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
-
-
-class _Stepped(NamedTuple):
-    """Of a step: its feet, whose moments are measured, their segments, whether plates miss one of them, or all; (6,)
-    deviations of their sum where plates measure all of it, else None; (C,) coordinates of which nothing is seen; (M,)
-    markers that show the posture."""
-
-    time_s: float
-    loads: _core.ContactLoads | None
-    sources: Codes
-    segments: tuple[str, ...]
-    unmeasured: bool
-    blind: bool
-    plates_sd: Array | None
-    unseen: npt.NDArray[np.bool_]
-    used: npt.NDArray[np.bool_]
 
 
 class Tracker:
@@ -95,9 +76,8 @@ class Tracker:
         self._sight = LiveSight(self.core_model)
         self._time: float | None = None
         self._latest: StepEstimate | None = None
-        self._stepped: deque[_Stepped] = deque(maxlen=lag + 2)  # and the one before, by which loads change
+        self._steps = Steps(self.core_model, lag)
         self._found = FoundNoise(late=lag > 0) if noise.calibrates(bool(calibrated.feet)) else None
-        self._off_plates = False  # whether some foot has stood off the plates
 
     def fresh(self) -> Tracker:
         """Another one, at the start of the same model."""
@@ -209,11 +189,11 @@ class Tracker:
         sources[unseen] = ABSENT
         blind = feet is not None and bool(feet.blind.any())
         plates_sd = None if feet is None or plates_refused or not feet.by_plates[0] else feet.plates_sd()[0]
-        self._off_plates |= feet is not None and stands_off_plates(feet.contact, len(self.calibrated.feet))
+        self._steps.off_plates |= feet is not None and stands_off_plates(feet.contact, len(self.calibrated.feet))
         segments = () if feet is None else feet.segments
         used = self._sight.used
-        step = _Stepped(sample.time_s, loads, sources, segments, unmeasured, blind, plates_sd, unseen, used)
-        self._stepped.append(step)
+        step = Stepped(sample.time_s, loads, sources, segments, unmeasured, blind, plates_sd, unseen, used)
+        self._steps.add(step)
         self._latest = self._estimate(step, sample.time_s, self.state, report)
         return self._latest
 
@@ -229,7 +209,7 @@ class Tracker:
         plates = np.array([sample.plates.get(name, unknown) for name in names], dtype=float) if sample.plates else None
         return self.feet.look(self.core_model, self.state, sample.time_s, plates, seen)
 
-    def _estimate(self, step: _Stepped, time_s: float, x: Array, report: _core.StepReport | None) -> StepEstimate:
+    def _estimate(self, step: Stepped, time_s: float, x: Array, report: _core.StepReport | None) -> StepEstimate:
         by_plates = step.plates_sd is not None
         return step_estimate(
             self.core_model, self._labels, time_s, x, report, step.sources, step.loads, by_plates=by_plates
@@ -265,60 +245,25 @@ class Tracker:
         Raises:
             ConfigError: ``delayed``, and the tracker was started without a lag.
         """
-        state, covariance = self.state, self.covariance
-        step = self._stepped[-1] if self._stepped else None
+        step, state, covariance = self._steps.last, self.state, self.covariance
         if late := delayed and self._with_lag().ready:
             lag = self._with_lag()
             step, state, covariance = self._delayed_step(lag), lag.state, lag.covariance
         noise, names = self.found_noise, self.calibrated.names
         root = np.sqrt(variance_scales(names, noise) / variance_scales(names, self.noise))
         covariance = root[:, None] * covariance * root
-        loads = step and step.loads
-        found = deviations_of(self.core_model, state, covariance, loads, step and step.plates_sd)
-        if step is not None and step.unmeasured:
-            found["moments"] = np.where(step.sources != MEASURED, prior_factor(noise), 1.0) * found["moments"]
-            found["wrench"] = (prior_factor(noise) if step.blind else 1.0) * found["wrench"]
-        if self.systematic is not None:
-            wrench, rate = np.zeros((0, 6)), None
-            if step is not None and step.loads is not None:
-                wrench = _core.contact_moments(self.core_model, state, step.loads)["foot_wrench"]
-                rate = self._wrench_rate(step, state, wrench)
-                if step.plates_sd is not None and rate is not None:
-                    found["wrench"] = np.hypot(found["wrench"], self.systematic.sizes.clock * rate[:-1].sum(axis=0))
-            segments = () if step is None else step.segments
-            sources, used = (None, None) if step is None else (step.sources, step.used)
-            if step is not None and not step.unmeasured:  # what is derived has refused plates
-                sources = as_believed(step.sources)
-            found |= self.systematic.at_scale(noise.variance_scale).added(
-                found, state, covariance, wrench, segments,
-                sources=sources, off_plates=self._off_plates, late=late, used=used,
-                wrench_rate=rate, step_s=step_of(np.array([each.time_s for each in self._stepped])),
-            )  # fmt: skip
-        if step is not None:
-            found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])
-            found |= {name: np.where(step.unseen, np.nan, found[name]) for name in BLOCKS[:3]}
+        found = self._steps.deviations(step, state, covariance, noise, self.systematic, late=late)
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
-
-    def _wrench_rate(self, step: _Stepped, state: Array, wrench: Array) -> Array | None:
-        """(F, 6) by how much the contacts' wrenches (F, 6) of a step changed since the one before, a second; None of
-        the first, and where other contacts bore before."""
-        earlier = [each for each in self._stepped if each.time_s < step.time_s]
-        before = max(earlier, default=None, key=lambda each: each.time_s)
-        if before is None or before.loads is None or before.segments != step.segments:
-            return None
-        then = _core.contact_moments(self.core_model, state, before.loads)["foot_wrench"]
-        return np.asarray((wrench - then) / (step.time_s - before.time_s))
 
     def _with_lag(self) -> _core.FixedLag:
         if self._lag is None:
             raise ConfigError("delayed: the tracker has no lag, expected Estimator.start(..., lag_s=SECONDS)")
         return self._lag
 
-    def _delayed_step(self, lag: _core.FixedLag) -> _Stepped:
+    def _delayed_step(self, lag: _core.FixedLag) -> Stepped:
         """What is known of the frame at the lag."""
         assert self._time is not None
-        time = self._time - lag.delay_s
-        return min(self._stepped, key=lambda step: abs(step.time_s - time))
+        return self._steps.at(self._time - lag.delay_s)
 
     def run_arrays(
         self, measured: Measurements, progress: Progress | None = None, *, state_only: bool = False

@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
-from dynakin.filter.joint_errors import trunks_of
+from dynakin.filter.uncertainty.upright import trunks_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
 from dynakin.settings.model import Priors
@@ -52,7 +52,7 @@ class InertialPriors:
     """Of what a left segment may differ by from the right one, over the deviations above: 2.5 % of a mass."""
     trunk_centre: float = 0.1
     """Part of its deviation by which the trunk's centre of mass may be identified, where its joint on the pelvis is
-    known to 30 mm (`error_sizes.spine_centre`) and the table is for persons of this physique. Plates show where it lies
+    known to 30 mm (`Sizes.spine_centre`) and the table is for persons of this physique. Plates show where it lies
     in the room; moments of the joint need how far it lies from the joint, and in the table both go together. L5/S1 of
     fast walks 40 and 42 was 7.9 and 7.0 N m off with 1, 4.5 and 5.8 with 0.1 (4.6 and 5.0 with the table); judged on
     41, 44 and `truth3d` 3 and 4 (docs/identification.md)."""

@@ -93,7 +93,7 @@ class Estimate:
     (`dynakin.results.measures.sources`).
 
     Deviations (``*_sd``) of coordinates, speeds, accelerations and moments hold what the filter cannot know of joints,
-    skin and centres of mass (`filter.systematic`), moments, ``foot_wrench`` and a measured total wrench also how far
+    skin and centres of mass (`filter.uncertainty`), moments, ``foot_wrench`` and a measured total wrench also how far
     plates may be out of step; an angle's zero is not in them. ``state_sd`` and covariances are the
     filter's own, but for ``state_sd`` of constants, which is by the declared noise.
 

@@ -96,7 +96,7 @@ class Noise(Called, use_attribute_docstrings=True):
     they are reported, not in the filter: skin that follows an angle never averages out."""
     systematic_scale: NotNegative = 1.0
     """Size of what is wrong in the same way in all frames with joints, skin, centres of mass and limbs without markers,
-    over its usual size (`filter.systematic`): added to the standard deviations of angles, speeds, accelerations and
+    over its usual size (`filter.uncertainty`): added to the standard deviations of angles, speeds, accelerations and
     moments when they are reported, not in the filter, of models that are fixed nowhere. What is not known of inertia is
     no part of it: it counts at least as the declared noise has it. 0: the filter's own alone, of inertia too."""
     soft_tissue_sd_fraction: NotNegative = scale(0.5, "of the declared size", "how far skin and flesh move")

@@ -14,7 +14,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.measurements import Measurements
-from dynakin.filter.systematic import Systematic
+from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.messages import Message
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.how import Calibration

@@ -13,7 +13,7 @@ from dynakin.filter.ground.closure import STATED
 from dynakin.filter.ground.mass_centre import second_derivative
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_sum import UNSEEN_APART
-from dynakin.filter.in_hands import HANDS
+from dynakin.filter.uncertainty.loads import HANDS
 from dynakin.messages import Message, about, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.units import GRAVITY_M_S2

@@ -12,7 +12,7 @@ import scipy
 from dynakin.arrays import runs, widened
 from dynakin.filter.ground.closure import Closure
 from dynakin.filter.ground.expected import ContactPaths
-from dynakin.filter.in_hands import HANDS
+from dynakin.filter.uncertainty.loads import HANDS
 from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import ALONE_M

@@ -11,7 +11,7 @@ from dynakin.arrays import filled
 from dynakin.bindings import _core
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.judged import Ground
-from dynakin.filter.limbs import unseen_limbs
+from dynakin.filter.uncertainty.mass_centres import unseen_limbs
 from dynakin.messages import Message, about, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.plates.pressure import pressed_at

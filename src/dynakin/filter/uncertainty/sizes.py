@@ -7,7 +7,7 @@ from typing import get_args
 
 import numpy as np
 
-from dynakin.filter.joint_errors import Kind
+from dynakin.filter.uncertainty.joint_errors import Kind
 from dynakin.model.calibration.calibrated import CalibratedModel, Hips
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.plan import angles_of
@@ -38,13 +38,13 @@ class Sizes:
         limbs: part of the distance from its joint by which the centres of mass of a limb that no marker shows lie
             forwards or higher than where it hangs: 0.1 to 0.3 walking, 0.7 in `truth3d`'s squats, 1 stretched out.
         clock: s, of the plates' clock off the markers': less than can be found in a walk.
-        skin_found: part of the declared size that the filter finds where skin moves as usual (`skin.skin_found`): where
+        skin_found: part of the declared size that the filter finds where skin moves as usual (`skin_found`): where
             it finds more, ``skin`` is larger in proportion.
         placed: m, how far (mean) markers may be found from where the model has them, for centres of joints to be as
             sure as said: of a model that was scaled worse to the person both are off, in proportion.
         own_speeds, own_moments: what the factor on the filter's own variance of smoothed speeds and moments grows by
-            with the movement's intensity (`reported_sd.OWN_LATE`).
-        vigorous: intensity beyond which what is unseen of smoothed moments grows faster (`reported_sd.VIGOROUS_GROWS`):
+            with the movement's intensity (`reported.OWN_LATE`).
+        vigorous: intensity beyond which what is unseen of smoothed moments grows faster (`reported.VIGOROUS_GROWS`):
             calm walks stay below it.
         own_off_plates: part of the variance by the declared noise that counts at least, of late moments that are
             measured in a recording in which some foot stands off the plates, or in a session in which one has: what

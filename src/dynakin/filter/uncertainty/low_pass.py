@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms
-from dynakin.filter.reported_sd import BLOCKS
-from dynakin.filter.systematic import Systematic
+from dynakin.bindings import _core
+from dynakin.filter.uncertainty.frames import wrenches_of
+from dynakin.filter.uncertainty.geometry import BLOCKS, Geometry
+from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.low_passed import LowPass
 from dynakin.results.estimate import values_of
@@ -47,7 +50,7 @@ def with_taken(data: xr.Dataset, low_pass: LowPass, systematic: Systematic | Non
         return data, note("low-passed", f"{sentence(text)}. That takes little but of impacts.")
     lost = _taken(values_of(data, "coordinates"), low_pass)
     if systematic is not None:
-        lost.append(np.nan_to_num(systematic.moments_moved(data, lost)))
+        lost.append(np.nan_to_num(_moments_moved(systematic.geometry, data, lost)))
     sizes = [low_pass.size(values) for values in lost]
     said = [values_of(data, f"{block}_sd") for block in BLOCKS]
     turns = np.asarray(data["coordinate_type"].values == "rotation")
@@ -83,3 +86,16 @@ def _taken(q: Array, low_pass: LowPass) -> list[Array]:
         return [np.zeros_like(q)] * 3
     whole = np.column_stack([np.interp(at, at[known], column[known]) for column in q.T])
     return [low_pass.taken(whole, derivative) for derivative in range(3)]
+
+
+def _moments_moved(geometry: Geometry, data: xr.Dataset, moved: Sequence[Array]) -> Array:
+    """(T, C): what moments change by where coordinates, speeds and accelerations (T, C) are others by ``moved`` and
+    the contacts' wrenches stay; NaN where the state is not a number."""
+    states, (wrench, segments) = values_of(data, "state"), wrenches_of(data)
+    change = np.hstack([values[:, geometry.free] for values in moved])
+    K = change.shape[1]
+    found = np.full((len(states), geometry.count), np.nan)
+    for k in np.flatnonzero(np.isfinite(states[:, :K]).all(axis=1)):
+        T = _core.moment_jacobian(geometry.model, states[k], geometry.external(wrench[k], segments))
+        found[k] = T[: geometry.count, :K] @ change[k]
+    return found

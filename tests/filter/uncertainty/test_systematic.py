@@ -14,21 +14,24 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
-from dynakin.filter.contacts import any_off_plates
-from dynakin.filter.error_sizes import KINDS, LANDMARKS, OF_JOINTS, SCALED, SHOWS_HIPS_RAD, Sizes, usual_sizes
-from dynakin.filter.in_hands import HANDS, Hands
-from dynakin.filter.joint_errors import OF_ROOT, JointErrors, hips_turned, neutral, trunks_of
-from dynakin.filter.reported_sd import (
-    BLOCKS,
+from dynakin.filter.uncertainty.frames import _STEP_S, Frame, Frames, any_off_plates
+from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Parts
+from dynakin.filter.uncertainty.joint_errors import OF_ROOT, JointErrors
+from dynakin.filter.uncertainty.loads import HANDS
+from dynakin.filter.uncertainty.reported import (
     OWN_AT_ONCE,
     OWN_LATE,
     STILL,
     VIGOROUS_GROWS,
+    Own,
     beyond_vigorous,
     movement_intensity,
     reported,
 )
-from dynakin.filter.systematic import _STEP_S, ROOT_SKIN, Systematic
+from dynakin.filter.uncertainty.sizes import KINDS, LANDMARKS, OF_JOINTS, SCALED, SHOWS_HIPS_RAD, Sizes, usual_sizes
+from dynakin.filter.uncertainty.skin import ROOT_SKIN
+from dynakin.filter.uncertainty.systematic import Systematic
+from dynakin.filter.uncertainty.upright import hips_turned, neutral, trunks_of
 from dynakin.model.calibration.calibrated import Provenance
 from dynakin.model.calibration.declared import with_loads
 from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
@@ -143,6 +146,56 @@ def systematic() -> Systematic:
     return Systematic(calibrated(), Noise())
 
 
+def parts_of(
+    subject: Systematic, q: Array, qd: Array, qdd: Array, external: Array | None = None, used: Any = None
+) -> Parts:
+    """Of one frame in which nothing else is unsure."""
+    x = np.concatenate([q, qd, qdd, subject.geometry.x0[3 * len(q) :]])
+    loads = np.zeros((len(subject.geometry.model.segment_names), 6)) if external is None else external
+    known = np.zeros(len(x)), np.zeros((len(x),) * 2)
+    return subject.parts_at(Frame(subject.geometry, x, loads, np.zeros_like(loads), used, known))
+
+
+def one_frame(own: Blocks, x: Array, P: Array, *, late: bool, rate: Array | None = None, scale: float = 1.0) -> Frames:
+    """A session's frame of covariance P by noise of this scale, with the contact on the shank."""
+    return Frames(
+        time=np.zeros(1),
+        step_s=np.nan,
+        states=x[None],
+        sd={block: sd[None] for block, sd in own.items()},
+        known_sd=np.ones((1, len(x))),
+        known=P / scale,
+        wrench=CONTACT[None, None],
+        wrench_rate=np.zeros((1, 1, 6)) if rate is None else rate[None, None],
+        segments=["shank"],
+        used=np.ones((1, 12), dtype=bool),
+        sources=np.full((1, len(Q)), MEASURED, dtype=np.uint8),
+        off_plates=False,
+        late=late,
+        variance_scale=scale,
+    )
+
+
+def with_errors(subject: Systematic, *given: Any, **how: Any) -> Blocks:
+    """With the errors of `one_frame`."""
+    frames = one_frame(*given, scale=subject._variance_scale, **how)
+    return {block: sd[0] for block, sd in subject.added(frames).items()}
+
+
+def over_time(data: xr.Dataset) -> Frames:
+    """Of a recording with or without estimates and deviations."""
+    shape = (len(data["time"]), len(Q))
+    blocks = {f"{block}{end}": (("time", "coordinate"), np.zeros(shape)) for block in BLOCKS for end in ("", "_sd")}
+    return Frames.of(data.assign(blocks), 1, 1.0, late=False)
+
+
+def own_of(sd: Blocks, intensity: Array, **how: Any) -> Own:
+    """The filter's own of frames of this intensity, whose markers lie where the model has them."""
+    sources = np.full(next(iter(sd.values())).shape, MEASURED, dtype=np.uint8)
+    usual = {"variance_scale": 1.0, "moved_m": np.zeros(len(intensity)), "sources": sources}
+    return Own(sd=sd, intensity=intensity, **usual | how)
+
+
 def with_motion(x: Array) -> Array:
     """The state in the movement of Q, QD and QDD."""
     moving = x.copy()
@@ -183,7 +236,7 @@ def rotation(vector: Array) -> Array:
 def test_effects_of_a_joint_are_those_of_a_model_that_is_changed(kind: str) -> None:
     external = np.zeros((3, 6))
     external[2] = CONTACT
-    parts = systematic().parts(Q, QD, QDD, external)[kind]
+    parts = parts_of(systematic(), Q, QD, QDD, external)[kind]
     size = 1e-5
     if kind != "hinge_axes":
         joint, along = {
@@ -205,7 +258,7 @@ def test_in_the_reference_posture_a_wrong_joint_changes_lever_arms_and_no_angle(
     still = np.zeros(10)
     external = np.zeros((3, 6))
     external[2, 1] = 500.0
-    parts = systematic().parts(REFERENCE, still, still, external)["hinge_centre"]
+    parts = parts_of(systematic(), REFERENCE, still, still, external)["hinge_centre"]
     np.testing.assert_allclose(parts["coordinates"], 0.0, atol=1e-12)
     np.testing.assert_allclose(parts["speeds"], 0.0, atol=1e-9)
     # the knee's moment: 500 N up less the shank's weight, which stays with the foot, times the place forward
@@ -231,19 +284,19 @@ def test_skin_that_follows_the_knee_is_that_of_displaced_markers() -> None:
         d[:4] *= ROOT_SKIN
         d *= DECLARED[:, None] * weight
         draws.append(np.linalg.solve(J.T @ J + 4.0 * np.eye(10), J.T @ d.ravel()))
-    parts = systematic().parts(Q, QD, QDD)["skin"]
+    parts = parts_of(systematic(), Q, QD, QDD)["skin"]
     np.testing.assert_allclose(np.sqrt(parts["coordinates"]), np.std(draws, axis=0), rtol=0.06)
 
 
 def test_markers_that_nobody_sees_show_nothing() -> None:
     """Two markers of four on the segment that floats: what the skin of the others does counts for more."""
     unsure, used = systematic(), np.ones(12, dtype=bool)
-    seen = unsure.parts(Q, QD, QDD, used=used)
-    np.testing.assert_array_equal(seen["skin"]["moments"], unsure.parts(Q, QD, QDD)["skin"]["moments"])
+    seen = parts_of(unsure, Q, QD, QDD, used=used)
+    np.testing.assert_array_equal(seen["skin"]["moments"], parts_of(unsure, Q, QD, QDD)["skin"]["moments"])
     used[:2] = False
-    gone = unsure.parts(Q, QD, QDD, used=used)
+    gone = parts_of(unsure, Q, QD, QDD, used=used)
     assert gone["skin"]["coordinates"][:6].sum() > 1.5 * seen["skin"]["coordinates"][:6].sum()
-    gain, _ = unsure._gain(unsure._errors.state(Q, QD, QDD), used)
+    gain, _ = unsure.geometry.gain(unsure.geometry.errors.state(Q, QD, QDD), used)
     assert not gain[:, np.repeat(~used, 3)].any() and np.isfinite(gain).all()
 
 
@@ -258,13 +311,13 @@ def test_a_marker_shows_the_posture_until_a_fifth_of_a_second_after_it_was_seen(
 def test_speeds_of_skin_are_the_rates_of_its_angles() -> None:
     """The same random displacement along the motion: its variance of speed, by differences of its effect in time."""
     subject = systematic()
-    parts = subject.parts(Q, QD, np.zeros(10))["skin"]
+    parts = parts_of(subject, Q, QD, np.zeros(10))["skin"]
     h = 1e-3
-    ahead, back = (subject.parts(Q + t * QD, QD, np.zeros(10))["skin"]["coordinates"] for t in (h, -h))
+    ahead, back = (parts_of(subject, Q + t * QD, QD, np.zeros(10))["skin"]["coordinates"] for t in (h, -h))
     # d/dt sd^2 = 2 cov(angle, speed), at most 2 sd(angle) sd(speed)
     slope = np.abs(ahead - back) / (2.0 * h)
     assert (slope <= 2.0 * np.sqrt(parts["coordinates"] * parts["speeds"]) * 1.001).all()
-    still = subject.parts(Q, np.zeros(10), np.zeros(10))["skin"]
+    still = parts_of(subject, Q, np.zeros(10), np.zeros(10))["skin"]
     np.testing.assert_allclose(still["speeds"], 0.0, atol=1e-12)
 
 
@@ -274,7 +327,7 @@ def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_o
     q[5] = 0.3  # rotation
     external = np.zeros((3, 6))
     external[2, 1] = 500.0
-    parts = systematic().parts(q, still, still, external)
+    parts = parts_of(systematic(), q, still, still, external)
     R = rotation(0.3 * Y)
     for kind, axes in (("root", (X, Y)), ("root_tilt", (Z,))):
         expected = np.zeros(3)
@@ -301,7 +354,7 @@ def test_a_centre_of_mass_off_its_place_is_that_of_segments_that_are_changed() -
             segments[k].inertia = inertia
             model.segments = segments
             expected += np.square((_core.joint_moments(_core.Model(model), x, external) - as_it_is) / 1e-3)
-    parts = systematic().parts(Q, QD, QDD, external)["mass_centre"]
+    parts = parts_of(systematic(), Q, QD, QDD, external)["mass_centre"]
     np.testing.assert_allclose(np.sqrt(parts["moments"]), np.sqrt(expected), rtol=1e-6)
     assert not any(parts[block].any() for block in ("coordinates", "speeds", "accelerations"))
 
@@ -315,7 +368,7 @@ def test_a_knee_that_rolls_otherwise_errs_as_one_that_is_changed() -> None:
     external = np.zeros((3, 6))
     external[2] = CONTACT
     subject = Systematic(person, Noise())
-    parts = subject.parts(Q, QD, QDD, external)["roll"]
+    parts = parts_of(subject, Q, QD, QDD, external)["roll"]
     size = 1e-5
     for values, block in zip(effects(_core.Model(spec(roll=size))), BLOCKS, strict=True):
         expected = np.abs(values / size)
@@ -323,7 +376,7 @@ def test_a_knee_that_rolls_otherwise_errs_as_one_that_is_changed() -> None:
             np.sqrt(parts[block]), expected, rtol=0.02, atol=2e-3 * expected.max(), err_msg=block
         )
     still = np.zeros(10)
-    straight = subject.parts(REFERENCE, still, still, external)["roll"]
+    straight = parts_of(subject, REFERENCE, still, still, external)["roll"]
     assert straight["coordinates"].max() < 1e-18
 
 
@@ -356,7 +409,7 @@ def test_a_clock_that_is_off_moves_moments_by_how_fast_loads_change() -> None:
     np.testing.assert_allclose(recorded["moments_sd"], np.tile(0.004 * np.abs(by_rate()), (5, 1)), rtol=1e-9)
     assert not recorded["speeds_sd"].any()
     own = {block: np.zeros(10) for block in BLOCKS}
-    live = subject.added(own, x, np.zeros((30, 30)), CONTACT[None], ["shank"], late=True, wrench_rate=RATE[None])
+    live = with_errors(subject, own, x, np.zeros((30, 30)), late=True, rate=RATE)
     np.testing.assert_allclose(live["moments"], recorded["moments_sd"][2], rtol=1e-9)
 
 
@@ -371,7 +424,7 @@ def test_a_recording_without_a_state_that_is_known_has_no_deviations() -> None:
         },
         coords={"time": 0.01 * np.arange(3), "foot_segment": ("foot", ["shank"])},
     )
-    parts = systematic().over_time(data)
+    parts = systematic().parts(over_time(data))
     assert all(np.isnan(values).all() for kind in parts.values() for values in kind.values())
 
 
@@ -390,8 +443,8 @@ def test_an_impact_counts_for_the_smoothed_moments_around_it() -> None:
     own = {"moments": np.ones((10, 1)), "speeds": np.ones((10, 1))}
     parts = {kind: {block: np.zeros((10, 1)) for block in own} for kind in KINDS}
     sizes = replace(NONE, vigorous=50.0, inertia=False)
-    arguments = (np.nan_to_num(intensity, nan=10.0), np.zeros(10))
-    late, soon = (reported(sizes, 1.0, own, parts, *arguments, late=each, step_s=0.01) for each in (True, False))
+    moving = np.nan_to_num(intensity, nan=10.0)
+    late, soon = (reported(own_of(own, moving, late=each, step_s=0.01), sizes, parts) for each in (True, False))
     calm = STILL + MOMENTS_MOVING * 10.0
     np.testing.assert_allclose(late["moments"][[0, 2], 0] ** 2, [calm, calm + VIGOROUS_GROWS * 2.0])
     assert soon["moments"][2] == soon["moments"][0] and late["speeds"][2] == late["speeds"][0]
@@ -405,7 +458,7 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     own = {block: np.full(10, 0.02) for block in BLOCKS} | {"accelerations": np.full(10, 2.0)}
     external = np.zeros((3, 6))
     external[2] = CONTACT
-    parts = subject.parts(Q, QD, QDD, external)
+    parts = parts_of(subject, Q, QD, QDD, external)
     parts["clock"] = {block: np.zeros(10) for block in BLOCKS} | {"moments": np.square(by_rate())}
     parts["hands"] = {block: np.zeros(10) for block in BLOCKS}  # a leg has none
     sizes = dict(zip(KINDS, SIZES, strict=True))
@@ -413,8 +466,8 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     nothing = Systematic(calibrated(), Noise(), subject.sizes.scaled(0.0))
     by_sizes = {"speeds": (STILL, MOVING), "moments": (STILL, MOMENTS_MOVING)}
     for late, laws in ((True, OWN_LATE | by_sizes), (False, OWN_AT_ONCE)):
-        both = subject.added(own, x, P, CONTACT[None], ["shank"], late=late, wrench_rate=RATE[None])
-        alone = nothing.added(own, x, P, CONTACT[None], ["shank"], late=late, wrench_rate=RATE[None])
+        both = with_errors(subject, own, x, P, late=late, rate=RATE)
+        alone = with_errors(nothing, own, x, P, late=late, rate=RATE)
         for block, (still, moving) in laws.items():
             factor = still + moving * intense
             added = sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)
@@ -427,8 +480,7 @@ def test_a_calm_movement_is_known_better_than_an_intense_one() -> None:
     subject = Systematic(calibrated(), Noise(), NONE)
     for late in (True, False):
         calm, intense = (
-            subject.added(own, np.r_[Q, QD, scale * QDD], np.zeros((30, 30)), CONTACT[None], ["shank"], late=late)
-            for scale in (0.0, 10.0)
+            with_errors(subject, own, np.r_[Q, QD, scale * QDD], np.zeros((30, 30)), late=late) for scale in (0.0, 10.0)
         )
         assert (calm["speeds"] < 1.0).all() and (intense["speeds"] > 1.0).all()
         np.testing.assert_allclose(calm["coordinates"], 1.0)
@@ -450,7 +502,8 @@ def test_measured_moments_count_more_where_some_foot_stands_off_the_plates_and_p
     scale = 0.1  # of the noise that was found
 
     def variances(scale: float, *, off_plates: bool, late: bool) -> dict[str, Array]:
-        found = reported(NONE, scale, own, parts, np.zeros(2), np.zeros(2), source, off_plates=off_plates, late=late)
+        seen = own_of(own, np.zeros(2), variance_scale=scale, sources=source, off_plates=off_plates, late=late)
+        found = reported(seen, NONE, parts)
         return {block: sd**2 for block, sd in found.items()}
 
     still, more, now = STILL, OFF_PLATES / scale, OWN_AT_ONCE["moments"][0]
@@ -468,9 +521,9 @@ def test_measured_moments_count_more_where_some_foot_stands_off_the_plates_and_p
 def test_of_smoothed_moments_more_is_unseen_the_further_frames_are_apart(hz: float, left: float) -> None:
     own = {"speeds": np.ones((1, 1)), "moments": np.ones((1, 1))}
     parts = {kind: {block: np.zeros((1, 1)) for block in own} for kind in (*KINDS, "inertia")}
-    found = reported(NONE, 1.0, own, parts, np.zeros(1), np.zeros(1), late=True, step_s=1.0 / hz)
+    found = reported(own_of(own, np.zeros(1), late=True, step_s=1.0 / hz), NONE, parts)
     np.testing.assert_allclose([found["moments"] ** 2, found["speeds"] ** 2], [[[left]], [[STILL]]])
-    at_once = reported(NONE, 1.0, own, parts, np.zeros(1), np.zeros(1), late=False, step_s=1.0 / hz)
+    at_once = reported(own_of(own, np.zeros(1), late=False, step_s=1.0 / hz), NONE, parts)
     np.testing.assert_allclose(at_once["moments"] ** 2, OWN_AT_ONCE["moments"][0])
 
 
@@ -507,15 +560,15 @@ def test_inertia_that_small_innovations_leave_open_is_known_by_the_declared_nois
     own = {block: np.zeros(10) for block in ("coordinates", "speeds", "accelerations")} | {"moments": np.sqrt(variance)}
     found = Systematic(subject, Noise(variance_scale=0.2), NONE)
     for late in (True, False):  # the factor on the filter's own counts nothing twice
-        seen = found.added(own, x, P, CONTACT[None], ["shank"], late=late)
+        seen = with_errors(found, own, x, P, late=late)
         np.testing.assert_allclose(seen["moments"], np.sqrt(variance / 0.2), rtol=1e-6)
         np.testing.assert_array_equal(seen["speeds"], 0.0)
     for late, factor in ((True, STILL), (False, OWN_AT_ONCE["moments"][0])):
         wide = Systematic(subject, Noise(variance_scale=1.5 / factor), NONE)  # the filter's own part has more of it
-        seen = wide.added(own, x, P, CONTACT[None], ["shank"], late=late)
+        seen = with_errors(wide, own, x, P, late=late)
         np.testing.assert_allclose(seen["moments"], np.sqrt(factor * variance), rtol=1e-6)
         scaled = Systematic(subject, Noise(variance_scale=0.2), replace(NONE, inertia=False))
-        seen = scaled.added(own, x, P, CONTACT[None], ["shank"], late=late)
+        seen = with_errors(scaled, own, x, P, late=late)
         np.testing.assert_allclose(seen["moments"], np.sqrt(factor * variance), rtol=1e-6)
 
 
@@ -527,9 +580,7 @@ def test_the_scale_of_systematic_errors_is_that_of_joints_and_skin() -> None:
     P[30:, 30:] = 0.01 * np.eye(4)
     own = {block: np.zeros(10) for block in ("coordinates", "speeds", "accelerations", "moments")}
     said = [
-        Systematic(subject, Noise(variance_scale=0.2, systematic_scale=scale)).added(
-            own, x, P, CONTACT[None], ["shank"], late=False
-        )
+        with_errors(Systematic(subject, Noise(variance_scale=0.2, systematic_scale=scale)), own, x, P, late=False)
         for scale in (1e-9, 1.0, 2.0)
     ]
     expected = (1.0 / 0.2 - OWN_AT_ONCE["moments"][0]) * by_inertia(subject, x, 0.1 * np.eye(4))
@@ -562,7 +613,7 @@ def test_over_time_inertia_is_known_as_well_as_in_each_frame() -> None:
     found = Systematic(subject, Noise(variance_scale=s), NONE)
     variance = by_inertia(subject, x, A)
     expected = wider[:, None] ** 2 * variance / s
-    np.testing.assert_allclose(found.over_time(data)["inertia"]["moments"], expected, rtol=1e-6)
+    np.testing.assert_allclose(found.parts(over_time(data))["inertia"]["moments"], expected, rtol=1e-6)
     blocks = ("coordinates", "speeds", "accelerations", "moments")
     data = data.assign(
         {f"{b}{end}": (("time", "coordinate"), np.zeros((4, 10))) for b in blocks for end in ("", "_sd")}
@@ -571,14 +622,19 @@ def test_over_time_inertia_is_known_as_well_as_in_each_frame() -> None:
     own = {block: np.zeros(10) for block in blocks}
     for k, w in enumerate(wider):
         scales = np.r_[np.ones(30), np.full(4, w)]
-        live = found.added(own, x, np.outer(scales, scales) * last, CONTACT[None], ["shank"], late=False)
+        live = with_errors(found, own, x, np.outer(scales, scales) * last, late=False)
         np.testing.assert_allclose(recorded[k], live["moments"], rtol=1e-9)
 
 
 def test_a_skeleton_whose_markers_lie_elsewhere_has_centres_of_joints_that_are_as_much_less_sure() -> None:
     person = calibrated()
-    person.names += tuple(f"marker/{marker.name}/{axis}" for marker in person.spec.markers for axis in "xyz")
-    person.x0 = x = np.concatenate([person.x0, *(marker.position for marker in person.spec.markers)])
+    markers = person.spec.markers
+    for marker in markers:
+        marker.estimated = [True] * 3
+    person.spec.markers = markers
+    core = _core.Model(person.spec)
+    person.names, person.x0 = tuple(core.layout.names), core.initial_state()
+    x = person.x0
     subject, moved = Systematic(person, Noise()), x.copy()
     moved[-3 * len(person.spec.markers) + 1 :: 3] += 0.012
     assert subject.moved_m(x) == 0.0
@@ -587,7 +643,7 @@ def test_a_skeleton_whose_markers_lie_elsewhere_has_centres_of_joints_that_are_a
     own = dict.fromkeys(BLOCKS, np.full(len(Q), 0.01)) | {"speeds": np.full(len(Q), 0.1)}
     own |= {"accelerations": np.full(len(Q), 10.0)}
     said = [
-        subject.added(own | {"moments": np.ones(len(Q))}, state, np.eye(len(x)), CONTACT[None], ["shank"], late=True)
+        with_errors(subject, own | {"moments": np.ones(len(Q))}, state, np.eye(len(x)), late=True)
         for state in (with_motion(x), with_motion(moved))
     ]
     assert (said[1]["moments"] >= said[0]["moments"]).all() and said[1]["moments"][-1] > 1.1 * said[0]["moments"][-1]
@@ -599,9 +655,9 @@ def test_a_skeleton_whose_markers_lie_elsewhere_has_centres_of_joints_that_are_a
     none = {kind: dict.fromkeys(BLOCKS, np.zeros((3, 1))) for kind in (*KINDS, "inertia")}
     centres = none | dict.fromkeys(("hinge_centre", "ball_centre"), dict.fromkeys(BLOCKS, np.ones((3, 1))))
     still, moved_m = dict.fromkeys(BLOCKS, np.zeros((3, 1))), SCALED.placed * np.array([0.5, 1.0, 3.0])
-    by_frame = reported(SCALED, 1.0, still, centres, np.zeros(3), moved_m, late=True)["moments"][:, 0]
+    by_frame = reported(own_of(still, np.zeros(3), moved_m=moved_m, late=True), SCALED, centres)["moments"][:, 0]
     np.testing.assert_allclose(by_frame / np.hypot(SCALED.hinge_centre, SCALED.ball_centre), [1.0, 1.0, 3.0])
-    measured = reported(LANDMARKS, 1.0, still, centres, np.zeros(3), np.full(3, 0.1), late=True)["moments"]
+    measured = reported(own_of(still, np.zeros(3), moved_m=np.full(3, 0.1), late=True), LANDMARKS, centres)["moments"]
     np.testing.assert_allclose(measured, np.hypot(LANDMARKS.hinge_centre, LANDMARKS.ball_centre))
 
 
@@ -625,9 +681,9 @@ def test_a_pelvis_is_as_sure_whichever_way_the_person_faces() -> None:
         x0 = standing.x0.copy()
         x0[heading] += turn
         found = Systematic(replace(standing, x0=x0), Noise())
-        q = found._reference + 0.05 * np.sin(np.arange(len(found._reference)))
+        q = found.geometry.reference + 0.05 * np.sin(np.arange(len(found.geometry.reference)))
         still = np.zeros_like(q)
-        parts = found.parts(q, still, still)
+        parts = parts_of(found, q, still, still)
         places = [standing.names.index(name) for name in ("hip_flexion_r", "hip_adduction_r", "hip_rotation_r")]
         said.append(np.concatenate([parts[kind]["coordinates"][places] for kind in OF_ROOT]))
         assert all((parts[kind]["coordinates"] < 0.3).all() for kind in OF_ROOT)
@@ -655,9 +711,9 @@ def test_a_clock_that_is_known_worse_counts_for_more() -> None:
     coarse = subject.with_found(0.01)
     assert coarse.sizes == replace(subject.sizes, clock=0.01) and subject.sizes.clock < 0.01
     own = dict.fromkeys(BLOCKS, np.zeros(10))
-    state = (own, np.r_[Q, QD, QDD], np.zeros((30, 30)), CONTACT[None], ["shank"])
-    surer, less = (each.added(*state, late=True, wrench_rate=RATE[None])["moments"] for each in (subject, coarse))
-    still = subject.added(*state, late=True, wrench_rate=np.zeros((1, 6)))["moments"]
+    state = (own, np.r_[Q, QD, QDD], np.zeros((30, 30)))
+    surer, less = (with_errors(each, *state, late=True, rate=RATE)["moments"] for each in (subject, coarse))
+    still = with_errors(subject, *state, late=True)["moments"]
     by_clock = (less**2 - still**2) / (surer**2 - still**2)
     np.testing.assert_allclose(by_clock[surer > 1.001 * still], (0.01 / subject.sizes.clock) ** 2)
 
@@ -676,17 +732,25 @@ def test_a_load_in_the_hands_counts_in_the_moments_that_bear_it() -> None:
         laden = with_loads(person, [CarriedLoad(segment=hand, mass_kg=1.0, place_m=place)])
         square += 0.5 * np.square(_core.joint_moments(_core.Model(laden.spec), x, np.zeros((len(own) + 1, 6))) - free)
     coordinates = [c.name for c in person.spec.coordinates]
-    borne = Hands(person.spec, _core.Model(person.spec)).variances(x, len(coordinates))
+    subject = Systematic(person, Noise())
+    motion = x[: 3 * len(subject.geometry.free)].reshape(3, -1)
+    borne = parts_of(subject, *motion)["hands"]["moments"]
     inner = [k for k, name in enumerate(coordinates) if not name.startswith("pelvis")]
     np.testing.assert_allclose(borne[inner], square[inner], atol=1e-9)
     elbow, knee = (coordinates.index(name) for name in ("elbow_flex_r", "knee_angle_r"))
     assert 1.0 < np.sqrt(borne[elbow]) < 3.0 and borne[knee] == 0.0
-    subject = Systematic(person, Noise())
     with_it = subject.with_found(0.0, 3.0)
     assert with_it.sizes == replace(subject.sizes, hands=3.0)
     own_sd = {block: np.zeros(len(coordinates)) for block in BLOCKS}
-    state: tuple[Any, ...] = (own_sd, x, np.zeros((len(x), len(x))), np.zeros((0, 6)), [])
-    without, held = (each.added(*state, late=True)["moments"] for each in (subject, with_it))
+    frames = replace(
+        one_frame(own_sd, x, np.zeros((len(x), len(x))), late=True),
+        wrench=np.zeros((1, 0, 6)),
+        wrench_rate=np.zeros((1, 0, 6)),
+        segments=[],
+        used=np.ones((1, len(person.spec.markers)), dtype=bool),
+        sources=np.full((1, len(coordinates)), MEASURED, dtype=np.uint8),
+    )
+    without, held = (each.added(frames)["moments"][0] for each in (subject, with_it))
     np.testing.assert_allclose(held[inner] ** 2 - without[inner] ** 2, 9.0 * borne[inner], atol=1e-9)
 
 
@@ -744,12 +808,12 @@ def test_arms_have_their_zero_where_they_hang() -> None:
     assert [upright[name] for name in ("pro_sup_r", "elbow_flex_l", "arm_flex_r")] == [2.0, 0.6, 0.4]
     assert upright["hip_flexion_r"] == upright["lumbar_extension"] == 0.0
     found = Systematic(person, Noise())
-    q = found._reference.copy()
+    q = found.geometry.reference.copy()
     still = np.zeros_like(q)
-    hanging = found.parts(q, still, still)
+    hanging = parts_of(found, q, still, still)
     assert all(hanging[kind]["coordinates"][arms].max() < 1e-12 for kind in OF_JOINTS)
     q[arms] += 0.2
-    moved = sum(LANDMARKS.pair_axes**2 * found.parts(q, still, still)["pair_axes"]["coordinates"][arms])
+    moved = sum(LANDMARKS.pair_axes**2 * parts_of(found, q, still, still)["pair_axes"]["coordinates"][arms])
     assert 0.0 < np.degrees(np.sqrt(moved)) < 3.0
 
 
@@ -758,10 +822,10 @@ def test_the_spine_is_no_joint_of_one_centre() -> None:
     person = measured()
     assert trunks_of(person) == {"torso"}
     found = Systematic(person, Noise())
-    q = found._reference.copy()
+    q = found.geometry.reference.copy()
     q[person.names.index("lumbar_bending")] += 0.3
     still = np.zeros_like(q)
-    parts = found.parts(q, still, still)
+    parts = parts_of(found, q, still, still)
     bending = person.names.index("lumbar_bending")
     spine, hips = (parts[kind]["coordinates"][bending] for kind in ("spine_centre", "ball_centre"))
     assert spine > 10.0 * hips and LANDMARKS.spine_centre > 10.0 * LANDMARKS.ball_centre
@@ -776,7 +840,7 @@ def test_hips_that_do_not_turn_stay_where_a_regression_has_them() -> None:
     external[[s.name for s in spec.segments].index(standing.feet["right"])] = [0.0, 700.0, 0.0, 0.0, 0.0, 0.0]
     names = [c.name for c in spec.coordinates]
     flexion, knee, other = (names.index(n) for n in ("hip_flexion_r", "knee_angle_r", "hip_flexion_l"))
-    sd = np.sqrt(subject.parts(q, still, still, external)["hips"]["moments"])
+    sd = np.sqrt(parts_of(subject, q, still, still, external)["hips"]["moments"])
     assert sd[flexion] == pytest.approx(700.0 * standing.sd0[standing.names.index("length/hip_forward")], rel=0.15)
     assert sd[knee] < 0.3 * sd[flexion] and sd[other] < 0.3 * sd[flexion]
     turns = [0.0, SHOWS_HIPS_RAD, np.inf]
@@ -788,7 +852,7 @@ def test_hips_that_do_not_turn_stay_where_a_regression_has_them() -> None:
     assert hips_turned(calibrated(), np.zeros((0, 10))) == np.inf
     functional = replace(standing.provenance, hips="functional")
     for other in (replace(standing, plan=None), replace(standing, provenance=functional)):  # no regression
-        assert not Systematic(other, Noise()).parts(q, still, still, external)["hips"]["moments"].any()
+        assert not parts_of(Systematic(other, Noise()), q, still, still, external)["hips"]["moments"].any()
 
 
 def test_more_skin_than_usual_counts_for_more_and_less_for_no_less() -> None:

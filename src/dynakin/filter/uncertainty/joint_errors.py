@@ -1,7 +1,6 @@
 """A model whose joints may be misplaced and turned: each error is a coordinate that stands still, so that the core's
 own derivatives say what it does to markers and moments ([derivations](derivations.md), section 17). Centres of mass of
-its segments may be displaced too: their first moments are states. What follows the joints' angles out of the upright
-posture: skin, and centres that roll."""
+its segments may be displaced too: their first moments are states."""
 
 from __future__ import annotations
 
@@ -14,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.filter.uncertainty.upright import floats, thighs_of
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
 from dynakin.model.calibration.pose_start import bare
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.spec import free_coordinates, free_names
@@ -134,11 +133,6 @@ class JointErrors:
         return x
 
 
-def floats(segment: _core.SegmentSpec) -> bool:
-    """Whether a segment moves freely in the laboratory."""
-    return bool(segment.parent == "ground" and len({axis.coordinate for axis in segment.axes}) == 6)
-
-
 def _orientations(spec: _core.ModelSpec, reference: Array) -> dict[str, Array]:
     """R_GB of each segment in the reference posture."""
     model = _core.Model(spec)
@@ -249,80 +243,3 @@ def _root_turned(name: str, R_B: Array, children: Sequence[_core.SegmentSpec], e
 def _along(segment: str, place: str, R: Array, vector: Array) -> Column:
     """A vector of ground axes as displacements of three of the errors' coordinates whose axes are R's columns."""
     return dict(zip(_names(segment, place), (R.T @ vector).tolist(), strict=True))
-
-
-def followed(q: Array, calibrated: CalibratedModel) -> Array:
-    """What skin follows of the free coordinates (..., K): it saturates, and is 0 upright."""
-    free = free_coordinates(calibrated.spec)
-    return np.asarray(np.tanh((q - neutral(calibrated)[free]) / SKIN_ANGLE_RAD))
-
-
-def trunks_of(calibrated: CalibratedModel) -> set[str]:
-    """Segments that hang on one that floats, and that no foot hangs on."""
-    return _on_root(calibrated) - {*calibrated.tree.up(*calibrated.feet.values())}
-
-
-def thighs_of(calibrated: CalibratedModel) -> set[str]:
-    """Segments that hang on one that floats, and that a foot hangs on."""
-    return _on_root(calibrated) & {*calibrated.tree.up(*calibrated.feet.values())}
-
-
-def _on_root(calibrated: CalibratedModel) -> set[str]:
-    roots = {segment.name for segment in calibrated.spec.segments if floats(segment)}
-    return {segment.name for segment in calibrated.spec.segments if segment.parent in roots}
-
-
-def hips_turned(calibrated: CalibratedModel, q: Array) -> float:
-    """rad, how far hips turn about their means in free coordinates (T, K): root mean square of the legs, of all axes
-    together; infinite where there are no hips or no frames."""
-    spec, thighs = calibrated.spec, thighs_of(calibrated)
-    place = {name: k for k, name in enumerate(free_names(spec))}
-    legs = [{place[axis.coordinate] for axis in segment.axes if axis.kind == "rotation" and axis.coordinate in place}
-            for segment in spec.segments if segment.name in thighs]  # fmt: skip
-    own, turning = sorted(set().union(*legs)), sum(map(bool, legs))
-    q = q[np.isfinite(q).all(axis=1)]
-    return float(np.sqrt(q[:, own].var(axis=0).sum() / turning)) if own and len(q) else np.inf
-
-
-def neutral(calibrated: CalibratedModel) -> Array:
-    """(C,) upright posture: free coordinates 0, or as near to it as their bounds allow. As the person starts are the
-    heading, because a pelvis' tilt and list are about axes of the laboratory, and what hangs on the trunk: arms stand
-    in no posture of all angles 0 (palms lie a quarter turn and more from it), and markers are put on arms that hang."""
-    spec = calibrated.spec
-    q = np.array([c.value for c in spec.coordinates], dtype=float)
-    free = free_coordinates(spec)
-    K = len(free)
-    q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
-    axes = [axis for segment in spec.segments if floats(segment) for axis in segment.axes]
-    turns = {axis.coordinate for axis in axes if axis.kind == "rotation" and axis.direction[1]}
-    above = calibrated.tree.below(*trunks_of(calibrated))
-    for segment in spec.segments:
-        if segment.name in above:
-            turns |= {axis.coordinate for axis in segment.axes}
-    for k, place in enumerate(free):
-        if spec.coordinates[place].name in turns:
-            q[place] = calibrated.x0[k]
-    return q
-
-
-def rolls(spec: _core.ModelSpec) -> list[str]:
-    """Lengths by which the centre of a joint moves with its angle, as elements of the state."""
-    axes = [axis for segment in spec.segments for axis in segment.axes if axis.kind == "translation"]
-    return [f"length/{scale}" for scale in dict.fromkeys(a.scale for a in axes if a.coordinate and a.scale)]
-
-
-def drives(spec: _core.ModelSpec, free: npt.NDArray[np.intp]) -> Array:
-    """(S, K) 1 where a free rotation moves a segment's skin: those of its own joint and of the joints that hang on it,
-    but for the root's, which turn the whole body."""
-    place = {spec.coordinates[k].name: i for i, k in enumerate(free)}
-    index = {segment.name: k for k, segment in enumerate(spec.segments)}
-    found = np.zeros((len(index), len(place)))
-    for segment in spec.segments:
-        if floats(segment):
-            continue
-        for axis in segment.axes:
-            if axis.kind == "rotation" and axis.coordinate in place:
-                found[index[segment.name], place[axis.coordinate]] = 1.0
-                if segment.parent in index:
-                    found[index[segment.parent], place[axis.coordinate]] = 1.0
-    return found

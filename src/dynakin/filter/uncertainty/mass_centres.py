@@ -1,4 +1,5 @@
-"""Limbs that no marker shows: they are locked to what carries them, and may hang, swing or be raised."""
+"""Centres of mass off where the model has them: of each segment, and of limbs that no marker shows, which are locked to
+what carries them, and may hang, swing or be raised."""
 
 from __future__ import annotations
 
@@ -8,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.filter.uncertainty.frames import Frame
+from dynakin.filter.uncertainty.geometry import Geometry, Parts
 from dynakin.model.calibration.calibrated import CalibratedModel
 
 Array = npt.NDArray[np.float64]
@@ -15,6 +18,21 @@ Array = npt.NDArray[np.float64]
 APART = 0.5
 """Times as far as forwards and up a limb may lie off to its side, each by itself (`Sizes.limbs`)."""
 _AXES = 3
+
+
+class MassCentres:
+    """Kinds "mass_centre" and "limbs"."""
+
+    def __init__(self, geometry: Geometry, calibrated: CalibratedModel) -> None:
+        self._geometry = geometry
+        self._limbs = unsure_moments(unseen_limbs(calibrated), geometry.errors.massive)
+
+    def variances(self, frame: Frame) -> Parts:
+        """Of moments, in one frame."""
+        errors = self._geometry.errors
+        by_moment = frame.moment_jacobian[:, errors.first_moments]
+        sources = (("mass_centre", by_moment * errors.masses), ("limbs", by_moment @ self._limbs))
+        return {kind: self._geometry.of_moments(np.square(displaced).sum(axis=1)) for kind, displaced in sources}
 
 
 def unseen_limbs(calibrated: CalibratedModel) -> list[dict[str, float]]:

@@ -3,20 +3,19 @@ systematic errors (`systematic`) of their sizes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.error_sizes import CENTRES, KINDS, Sizes
+from dynakin.filter.uncertainty.geometry import Blocks, Parts
+from dynakin.filter.uncertainty.sizes import CENTRES, KINDS, Sizes
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
 
 Array = npt.NDArray[np.float64]
 
-BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
-
-Own = dict[str, tuple[float, float]]
-OWN_LATE: Own = {"coordinates": (1.0, 0.0), "accelerations": (0.12, 0.04)}
+Factors = dict[str, tuple[float, float]]
+OWN_LATE: Factors = {"coordinates": (1.0, 0.0), "accelerations": (0.12, 0.04)}
 """Factor on the filter's own variance of a block where later frames helped: the first number, and the second times the
 `movement_intensity`. One density of jerk serves all movements: in theory half of a speed's variance is what such jerk
 leaves unseen, and five sixths of an acceleration's; a calm movement has none of it, an intense one more. Speeds
@@ -31,7 +30,7 @@ VIGOROUS_GROWS, VIGOROUS_S = 5.0, 0.03
 before and after such a moment it does: smoothing spreads an impact. Runs, hops, side-steps and landings by an
 independent truth were 2 to 4 times as far off as said, with an .osim most of all; chosen, with ``Sizes.vigorous``, on
 `truth3d`'s seeds 1, 2, a run, a side-step, a jump and one-leg hops (docs/validation/deviations.md)."""
-OWN_AT_ONCE: Own = {
+OWN_AT_ONCE: Factors = {
     "coordinates": (1.0, 0.0),
     "speeds": (STILL, 0.4),
     "accelerations": (STILL, 0.4),
@@ -62,53 +61,57 @@ def as_believed(sources: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
     return np.where(sources == DERIVED, MEASURED, sources).astype(np.uint8)
 
 
-Parts = dict[str, dict[str, Array]]
+@dataclass(frozen=True, eq=False)
+class Own:
+    """The filter's own deviations, and what says how much of their variance holds.
+
+    Attributes:
+        sd: block -> (..., C). variance_scale: of the noise of the filter.
+        intensity: (...,) as of `movement_intensity`. moved_m: (...,) as of `Systematic.moved_m`.
+        sources: (..., C) of the moments (`results.measures.sources`): the filter's own part of what rests on a prior
+            counts in full, because how a jerk is seen has no part in that.
+        late: whether later frames helped. off_plates: whether `Sizes.own_off_plates` counts. step_s: usual step from
+            frame to frame, s.
+    """
+
+    sd: Blocks
+    variance_scale: float
+    intensity: Array
+    moved_m: Array
+    sources: npt.NDArray[np.uint8]
+    late: bool
+    off_plates: bool = False
+    step_s: float = np.nan
 
 
-def reported(
-    sizes: Sizes,
-    variance_scale: float,
-    own: Mapping[str, Array],
-    parts: Parts,
-    intensity: Array,
-    moved_m: Array,
-    sources: npt.NDArray[np.uint8] | None = None,
-    *,
-    off_plates: bool = False,
-    late: bool,
-    step_s: float = np.nan,
-) -> dict[str, Array]:
+def reported(own: Own, sizes: Sizes, parts: Parts) -> Blocks:
     """Standard deviations that are reported: block -> (..., C).
 
     Args:
-        variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
-            `Systematic.over_time`. intensity: (...,) as of `movement_intensity`. moved_m: (...,) as of
-            `Systematic.moved_m`. sources: (..., C) of the moments (`results.measures.sources`): the filter's own part
-            of what rests on a prior counts in full, because how a jerk is seen has no part in that. off_plates: whether
-            `Sizes.own_off_plates` counts. late: whether later frames helped. step_s: usual step from frame to frame, s.
+        parts: variances as of `Systematic.parts`.
     """
-    apart = float(np.fmax(step_s, STILL_TO_S)) / STILL_TO_S
+    apart = float(np.fmax(own.step_s, STILL_TO_S)) / STILL_TO_S
     by_sizes = {
         "speeds": (STILL, sizes.own_speeds),
         "moments": (min(STILL * apart**2, 1.0), sizes.own_moments),
     }
-    factors = OWN_LATE | by_sizes if late else OWN_AT_ONCE
-    farther = np.maximum(moved_m / sizes.placed, 1.0)[..., None]
+    factors = OWN_LATE | by_sizes if own.late else OWN_AT_ONCE
+    farther = np.maximum(own.moved_m / sizes.placed, 1.0)[..., None]
     found = {}
-    for block, sd in own.items():
+    for block, sd in own.sd.items():
         still, moving = factors[block]
-        factor = still + moving * intensity[..., None]
-        if late and block == "moments":
-            factor = factor + VIGOROUS_GROWS * beyond_vigorous(intensity, sizes.vigorous, step_s)[..., None]
-        if sources is not None and block == "moments":
-            measured = sizes.own_off_plates / variance_scale if late and off_plates else 0.0
-            least = np.select([sources == PRIOR, sources == MEASURED], [1.0, measured], 0.0)
+        factor = still + moving * own.intensity[..., None]
+        if own.late and block == "moments":
+            factor = factor + VIGOROUS_GROWS * beyond_vigorous(own.intensity, sizes.vigorous, own.step_s)[..., None]
+        if block == "moments":
+            measured = sizes.own_off_plates / own.variance_scale if own.late and own.off_plates else 0.0
+            least = np.select([own.sources == PRIOR, own.sources == MEASURED], [1.0, measured], 0.0)
             factor = np.maximum(factor, least)
         variance = factor * np.square(sd)
         for kind in KINDS:
             size = getattr(sizes, kind) * (farther if kind in CENTRES else 1.0)
             variance = variance + size**2 * parts[kind][block]
         if sizes.inertia:  # the filter's own part has so much of it already
-            variance = variance + np.maximum(1.0 - factor * variance_scale, 0.0) * parts["inertia"][block]
+            variance = variance + np.maximum(1.0 - factor * own.variance_scale, 0.0) * parts["inertia"][block]
         found[block] = np.sqrt(variance)
     return found

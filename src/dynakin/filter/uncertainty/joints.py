@@ -1,0 +1,68 @@
+"""Joints whose centres and axes lie elsewhere: what that does to what is estimated."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.bindings import _core
+from dynakin.filter.uncertainty.frames import Frame, differences
+from dynakin.filter.uncertainty.geometry import Geometry, Parts
+from dynakin.filter.uncertainty.sizes import CENTRES, OF_JOINTS, less_sure_joints
+from dynakin.filter.uncertainty.upright import rolls
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.settings.noise import Noise
+
+Array = npt.NDArray[np.float64]
+
+
+class Joints:
+    """Kinds `OF_JOINTS`, "roll" (how far a joint's centre moves with its angle), and "hips" (what the priors leave open
+    of their centres)."""
+
+    def __init__(self, geometry: Geometry, calibrated: CalibratedModel, noise: Noise) -> None:
+        self._geometry, errors = geometry, geometry.errors
+        first = {name: k for k, name in enumerate(calibrated.names)}
+        self._rolls = [first[name] for name in rolls(calibrated.spec) if name in first]
+        gain, N = geometry.gain(geometry.upright())
+        self._B0 = gain @ np.hstack([N, self._rolled(geometry.reference)])
+        kinds = np.array([*errors.kinds, *("roll" for _ in self._rolls)])
+        self._columns = {kind: np.flatnonzero(kinds == kind) for kind in (*OF_JOINTS, "roll")}
+        unsure, of_rolls = less_sure_joints(calibrated), len(self._rolls)
+        sources = zip(errors.kinds, errors.joints, strict=True)
+        times = [unsure.get(joint, 1.0) if kind in CENTRES else 1.0 for kind, joint in sources]
+        self._times = np.append(times, np.ones(of_rolls))
+        self._hips_open_m = noise.systematic_scale * np.append(errors.hips_open_m(calibrated), np.zeros(of_rolls))
+
+    def variances(self, frame: Frame) -> Parts:
+        """By kind of error, in one frame."""
+        errors = self._geometry.errors
+        B, Bd, Bdd = differences([gain @ np.hstack([N, self._rolled(q)]) for q, gain, N in frame.around])
+        T = frame.moment_jacobian
+        Tq, Tv, Ta = frame.moments_by_motion
+        direct = np.hstack([T[:, errors.placed] @ errors.sources, self._rolled_moments(frame)])
+        moved = Tq @ B + Tv @ Bd + Ta @ Bdd + direct
+        # of angles what changes with the posture: a zero is a definition
+        squares = [np.square(values) for values in (B - self._B0, Bd, Bdd, moved)]
+        found = {}
+        for kind, chosen in self._columns.items():
+            found[kind] = self._geometry.blocks(*(values[:, chosen] @ self._times[chosen] ** 2 for values in squares))
+        found["hips"] = self._geometry.blocks(*(values @ self._hips_open_m**2 for values in squares))
+        return found
+
+    def _rolled(self, q: Array) -> Array:
+        """(3 M, L): what joints' centres that move with their angle do to the markers, a m/rad (`rolls`)."""
+        if not self._rolls:
+            return np.zeros((3 * len(self._geometry.segment), 0))
+        x = self._geometry.x0.copy()
+        x[: len(q)] = q
+        return np.asarray(_core.marker_jacobian(self._geometry.model, x)[:, self._rolls])
+
+    def _rolled_moments(self, frame: Frame) -> Array:
+        """(C, L): what they do to moments."""
+        if not self._rolls:
+            return np.zeros((self._geometry.count, 0))
+        x, moving = self._geometry.x0.copy(), np.concatenate(frame.motion)
+        x[: len(moving)] = moving
+        T = _core.moment_jacobian(self._geometry.model, x, frame.external)
+        return np.asarray(T[: self._geometry.count, self._rolls])

@@ -1,0 +1,80 @@
+"""Loads that are not as the model has them: by a clock of the plates that is off, and in the hands."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.bindings import _core
+from dynakin.filter.uncertainty.frames import Frame, rates
+from dynakin.filter.uncertainty.geometry import Geometry, Parts
+from dynakin.recordings.feet.contact import UNMEASURED
+from dynakin.results.estimate import values_of
+from dynakin.results.measures.sources import MEASURED, wrench_sources
+from dynakin.units import GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = npt.NDArray[np.float64]
+
+HANDS = ("hand_r", "hand_l")
+"""Segments that may hold something, by their names in `fullbody` and in OpenSim's models."""
+
+
+class Clock:
+    """Kind "clock": loads that act a second later than they did. Moments are linear in them."""
+
+    def __init__(self, geometry: Geometry) -> None:
+        self._geometry = geometry
+
+    def variances(self, frame: Frame) -> Parts:
+        """Of moments, in one frame."""
+        model, load = self._geometry.model, frame.external_rate
+        moments = _core.joint_moments(model, frame.x, load) - _core.joint_moments(model, frame.x, np.zeros_like(load))
+        return {"clock": self._geometry.of_moments(np.square(moments))}
+
+
+class Hands:
+    """Kind "hands": 1 kg in the middle of both together, as far as the model has any."""
+
+    def __init__(self, geometry: Geometry) -> None:
+        self._geometry, spec = geometry, geometry.model.spec
+        names = [segment.name for segment in spec.segments]
+        self._at = [names.index(name) for name in HANDS if name in names]
+        inertia = [np.asarray(spec.segments[k].inertia, dtype=float) for k in self._at]
+        self._centres = [own[1:4] / own[0] if own[0] > 0.0 else np.zeros(3) for own in inertia]
+
+    def variances(self, frame: Frame) -> Parts:
+        """Of moments, in one frame, by its weight, because who carries something moves it at much less than g. Each
+        hand holds 1/sqrt(2) kg, by itself: L5/S1 then bears 1 kg as it does with all of it in both, and a shoulder more
+        than half and less than all of it."""
+        model = self._geometry.model
+        turns, places = _core.segment_poses(model, frame.x)
+        nothing = np.zeros_like(frame.external)
+        found = np.zeros(self._geometry.count)
+        for k, centre in zip(self._at, self._centres, strict=True):
+            load, weight = nothing.copy(), np.array([0.0, -GRAVITY_M_S2, 0.0])
+            load[k] = np.concatenate([weight, np.cross(places[k] + turns[k] @ centre, weight)])
+            with_it, without = (_core.joint_moments(model, frame.x, each) for each in (load, nothing))
+            found += 0.5 * np.square(with_it - without)
+        return {"hands": self._geometry.of_moments(found)}
+
+
+def late_by(data: xr.Dataset, clock_sd_s: float) -> dict[str, Any]:
+    """Deviations of the contacts' wrenches, and of their sum where that is measured, with a clock of the plates that is
+    off by so much: what acts later is off by that times its change, as in moments. No plate's clock is in what none
+    measures."""
+    time = np.asarray(data["time"].values)
+    found: dict[str, Any] = {}
+    if "foot_wrench_sd" in data:
+        unmeasured = (values_of(data, "foot_contact") == UNMEASURED)[..., None]
+        late = clock_sd_s * rates(np.where(unmeasured, np.nan, values_of(data, "foot_wrench")), time)
+        found["foot_wrench_sd"] = (("time", "foot", "component"), np.hypot(values_of(data, "foot_wrench_sd"), late))
+    if "wrench_sd" in data:
+        late = clock_sd_s * rates(values_of(data, "wrench_estimated"), time)
+        late = np.where(wrench_sources(data) == MEASURED, late, 0.0)
+        found["wrench_sd"] = (("time", "component"), np.hypot(values_of(data, "wrench_sd"), late))
+    return found
