@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
-from dynakin.filter.augment import variance_scales
 from dynakin.filter.contacts import ContactLoads, stands_off_plates
 from dynakin.filter.core_filter import core_filter, smoothed
 from dynakin.filter.live.feet import LiveFeet
@@ -76,7 +75,7 @@ class Tracker:
         self._sight = LiveSight(self.core_model)
         self._time: float | None = None
         self._latest: StepEstimate | None = None
-        self._steps = Steps(self.core_model, lag)
+        self._steps = Steps(self.core_model, noise, lag)
         self._found = FoundNoise(late=lag > 0) if noise.calibrates(bool(calibrated.feet)) else None
 
     def fresh(self) -> Tracker:
@@ -249,10 +248,7 @@ class Tracker:
         if late := delayed and self._with_lag().ready:
             lag = self._with_lag()
             step, state, covariance = self._delayed_step(lag), lag.state, lag.covariance
-        noise, names = self.found_noise, self.calibrated.names
-        root = np.sqrt(variance_scales(names, noise) / variance_scales(names, self.noise))
-        covariance = root[:, None] * covariance * root
-        found = self._steps.deviations(step, state, covariance, noise, self.systematic, late=late)
+        found = self._steps.deviations(step, (state, covariance), self.found_noise, self.systematic, late=late)
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
 
     def _with_lag(self) -> _core.FixedLag:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.filter.augment import variance_scales
 from dynakin.filter.noise import prior_factor
 from dynakin.filter.step import Codes, deviations_of
 from dynakin.filter.uncertainty.frames import Frames
@@ -46,8 +47,8 @@ class Steps:
         off_plates: whether some foot has stood off the plates.
     """
 
-    def __init__(self, model: _core.Model, lag: int) -> None:
-        self._model = model
+    def __init__(self, model: _core.Model, noise: Noise, lag: int) -> None:
+        self._model, self._noise = model, noise
         count, markers = len(model.coordinate_names), len(model.spec.markers)
         unseen, used = np.zeros(count, dtype=bool), np.ones(markers, dtype=bool)
         self.last = Stepped(0.0, None, np.zeros(count, np.uint8), (), False, False, None, unseen, used)
@@ -66,23 +67,29 @@ class Steps:
     def deviations(
         self,
         step: Stepped,
-        state: Array,
-        covariance: Array,
-        noise: Noise,
+        known: tuple[Array, Array],
+        found_noise: Noise,
         systematic: Systematic | None,
         *,
         late: bool,
     ) -> dict[str, Array]:
-        """Standard deviations of a state (n,) of this covariance (n, n): blocks (C,), wrench (6,).
+        """Standard deviations of what is known: blocks (C,), wrench (6,).
 
         Args:
-            noise: that the covariance goes by. systematic: what is added to the filter's own. late: whether later
-                frames helped.
+            known: state (n,) and its covariance (n, n), by the filter's noise. found_noise: that these go by, but of
+                what rests on a contact that no plate measures, whose prior innovations say nothing of.
+            systematic: what is added to the filter's own. late: whether later frames helped.
         """
-        found = deviations_of(self._model, state, covariance, step.loads, step.plates_sd)
+        (state, covariance), names = known, self._model.layout.names
+        root = np.sqrt(variance_scales(names, found_noise) / variance_scales(names, self._noise))
+        shown = root[:, None] * covariance * root
+        found = deviations_of(self._model, state, shown, step.loads, step.plates_sd)
         if step.unmeasured:
-            found["moments"] = np.where(step.sources != MEASURED, prior_factor(noise), 1.0) * found["moments"]
-            found["wrench"] = (prior_factor(noise) if step.blind else 1.0) * found["wrench"]
+            prior, factor = found, prior_factor(self._noise)
+            if found_noise.variance_scale != self._noise.variance_scale:
+                prior = deviations_of(self._model, state, covariance, step.loads, step.plates_sd)
+            found["moments"] = np.where(step.sources != MEASURED, factor * prior["moments"], found["moments"])
+            found["wrench"] = factor * prior["wrench"] if step.blind else found["wrench"]
         if systematic is not None:
             wrench, rate = self.wrenches(step, state)
             if step.plates_sd is not None:
@@ -93,7 +100,7 @@ class Steps:
                 states=state[None],
                 sd={block: found[block][None] for block in BLOCKS},
                 known_sd=np.ones((1, len(state))),
-                known=covariance / noise.variance_scale,
+                known=covariance / self._noise.variance_scale,
                 wrench=wrench[None],
                 wrench_rate=rate[None],
                 segments=step.segments,
@@ -101,7 +108,7 @@ class Steps:
                 sources=(step.sources if step.unmeasured else as_believed(step.sources))[None],
                 off_plates=self.off_plates,
                 late=late,
-                variance_scale=noise.variance_scale,
+                variance_scale=found_noise.variance_scale,
             )
             found |= {block: values[0] for block, values in systematic.added(frames).items()}
         found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])
