@@ -22,7 +22,6 @@ from typing import Any
 import xarray as xr
 from corpus_references import Difference, Key, Theirs, differences, of_opensim, of_vicon
 from pages import put
-from source_digest import source_digest
 
 from dynakin.errors import DynakinError
 from dynakin.messages import about, from_attributes, warnings_of
@@ -30,6 +29,7 @@ from dynakin.recordings.companions import STANDING_WORDS, companion_forces, comp
 from dynakin.recordings.frame import find_laboratory_frame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
+from dynakin.studies.engine.build import build
 from recordings import DATA, kept
 
 ANGLE_GOAL_DEG, MOMENT_GOAL = 5.0, 0.15
@@ -214,7 +214,7 @@ def main() -> None:
         for path in ([folder] if folder.is_file() else sorted(folder.rglob("*")))
         if path.suffix.casefold() in (".c3d", ".trc") and all(part in str(path) for part in asked.only)
     ]
-    source = source_digest()
+    source = build()
     with ThreadPoolExecutor(asked.jobs) as pool:
         rows = [row for each in pool.map(lambda path: rows_of(path, source), paths) for row in each]
     lines = [*table(rows), "", *compared(rows)]

@@ -26,7 +26,6 @@ from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize
-from source_digest import source_digest
 
 import dynakin
 from dynakin.filter.uncertainty.frames import Frames
@@ -42,6 +41,7 @@ from dynakin.results.measures.sources import MEASURED, moment_sources
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
 from dynakin.simulation.trial import simulate
+from dynakin.studies.engine.build import build
 
 KEPT = Path(__file__).resolve().parents[1] / "build" / "intervals"
 TRUTH3D = ("squat/fullbody", "squat/osim", "walk/fullbody", "walk/osim")
@@ -80,7 +80,7 @@ class Run:
 def runs_of(
     case: str, seed: int, folder: Path | None, noise: Noise, lag_s: float | None, again: bool, source: str
 ) -> Run:
-    """As kept, else made. ``source``: `source_digest`."""
+    """As kept, else made. ``source``: `build`."""
     trial = trial_of(case, seed, folder) if case in TRUTH3D else None
     key = sha256(json.dumps([source, case, seed, lag_s, noise.model_dump()], sort_keys=True).encode())
     for file in (Path(__file__), *([trial / name for name in FILES] if trial else ())):
@@ -292,7 +292,7 @@ def main() -> None:
     asked = parser.parse_args()
     noise = presets.preset(asked.preset, {"systematic_scale": 0.0})
     cases = asked.cases or [case for case in CASES if asked.trials or case not in TRUTH3D]
-    source = source_digest()
+    source = build()
     runs = [
         runs_of(case, int(seed), asked.trials, noise, asked.lag, asked.again, source)
         for case in cases

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from source_digest import source_digest
 from withheld_judge import Found
 
 from dynakin.errors import DynakinError
 from dynakin.pipeline.stages import configure
 from dynakin.recordings.recording import Recording
+from dynakin.studies.engine.build import build
 from dynakin.validation.case import case_of
 from dynakin.validation.methods import estimate_each
 
@@ -42,7 +42,7 @@ def kept_run(
     Args:
         settings: keys of a configuration; ``model`` is a built-in one or a file.
     """
-    digest = hashlib.sha256(source_digest().encode() + json.dumps(dict(settings), sort_keys=True).encode())
+    digest = hashlib.sha256(build().encode() + json.dumps(dict(settings), sort_keys=True).encode())
     for each in (recording, static):
         if each is not None:
             digest.update(repr(each.marker_names).encode() + each.time.tobytes() + each.markers.tobytes())

@@ -27,9 +27,9 @@ import xarray as xr
 from numpy.typing import NDArray
 from pages import put
 from recordings_references import JOINTS, SIDES, Array, Inverse, Reference, bodies_under, of_c3d, of_storage
-from source_digest import source_digest
 
 from dynakin.results.measures.sources import MEANINGS, MEASURED
+from dynakin.studies.engine.build import build
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", ROOT.parent / "shared" / "data"))
@@ -362,7 +362,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="put the tables into docs/validation/recordings.md")
     asked = parser.parse_args()
     chosen = [t for t in TRIALS if not asked.names or any(part in t.name for part in asked.names)]
-    source = source_digest()
+    source = build()
     with ThreadPoolExecutor(asked.jobs) as pool:
         runs = list(pool.map(lambda trial: run(trial, asked.model, source), chosen))
     lines = list(tables(runs))

@@ -39,7 +39,8 @@ from withheld_judge import (
 )
 
 from dynakin.recordings.orientation import axis_vector
-from dynakin.recordings.plates.pressure import LOADED_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.output import SimulatedTrial

@@ -105,10 +105,19 @@ def test_identified_on_one_trial_and_judged_on_another(trial: list[str], tmp_pat
 
 
 def test_a_configuration_may_stand_for_a_trial(trial: list[str], tmp_path: Path) -> None:
+    """And gives what the same options give."""
     config = tmp_path / "squat.toml"
     lines = [f'trial = "{trial[0]}"', f'forces = "{trial[2]}"', 'model = "sagittal7"', 'markers = "opencap"']
-    config.write_text("\n".join([*lines, "mass_kg = 70.0"]))
-    assert main(["compare", str(config)]) == 0
+    config.write_text("\n".join([*lines, "mass_kg = 66.0", "height_m = 1.75", 'sex = "male"']))
+    options = [*SUBJECT[:5], "66", *SUBJECT[6:]]  # another mass than the trial's own: it is read from the file
+    assert main(["compare", str(config), "-o", str(tmp_path / "a")]) == 0
+    assert main(["compare", *trial, *options, "-o", str(tmp_path / "b")]) == 0
+    for table in ("table2.csv", "angles.csv", "moments.csv"):
+        assert rows_of(tmp_path / "a" / table) == rows_of(tmp_path / "b" / table) != []
+    (warned,) = {
+        tuple(json.loads((tmp_path / k / "comparison.json").read_text())["trials"][0]["warnings"]) for k in "ab"
+    }
+    assert any("66.0 kg" in warning for warning in warned)
 
 
 @pytest.mark.parametrize(

@@ -6,15 +6,20 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from dynakin import Estimator, Subject, load_model
 from dynakin.cli.app import main
 from dynakin.results.files.folder import OUTPUT_FILES
 from dynakin.simulation.trial import simulate
 
 SUBJECT = ["--model", "fullbody", "--mass", "70", "--height", "1.75", "--sex", "male"]
 # a squat on two plates; a walk over three of them, which stand in the middle third of its way
-TRIALS = {"squat": (5.0, 12.5), "gait": (5.0, 15.0)}
+TRIALS = {"squat": (5.0, 12.5), "gait": (5.0, 25.0)}
+MOST = {"squat": (14.0, 6.5, 1.5), "gait": (7.0, 68.0, 39.0)}
+"""Half as much again as it is (9.4 mm, 4.4 N, 1.0 N; 4.5 mm, 45 N, 26 N): markers left out, mm; the vertical force
+withheld, and given, N of 687."""
 
 
 def saved(folder: Path, motion: str) -> list[str]:
@@ -33,14 +38,22 @@ def test_compare_judges_a_body_in_space_by_what_it_has_not_seen(motion: str, tmp
     with (out / "unseen.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     fit = {(row["yardstick"], row["quantity"]): float(row["rms"]) for row in rows if row["method"] == "EKF (default)"}
-    assert fit["marker left out", "markers"] < 20.0  # mm
-    # of 687 N, which was the error where a foot off the plates was taken for a body in the air
-    assert fit["plates withheld", "fy"] < (60.0 if motion == "squat" else 350.0)
+    left_out, withheld, given = MOST[motion]
+    assert fit["marker left out", "markers"] < left_out
+    # the whole weight was the error where a foot off the plates was taken for a body in the air
+    assert fit["plates withheld", "fy"] < withheld
     with (out / "table2.csv").open(encoding="utf-8", newline="") as file:
         judged = {row["method"]: row for row in csv.DictReader(file) if row["quantity"] == "fy"}
-    assert set(judged) == {"EKF (default)", "IK + ID (6 Hz)"}  # 12 Hz is not below half of this rate
+    assert set(judged) == {"EKF (default)", "IK + ID (6 Hz)"}  # 12 Hz is hardly below half of these rates, or above
     weight = judged["EKF (default)"]
-    assert float(weight["rms"]) < (10.0 if motion == "squat" else 150.0)
+    assert float(weight["rms"]) < given
+
+
+@pytest.mark.xfail(strict=True, reason="plates are said to carry 10 % more than the motion needs, and are not used")
+def test_plates_of_a_walk_are_used_with_cameras_of_15_hz() -> None:
+    walk = simulate("fullbody", "gait", 3, 5.0, 15.0).recording
+    ready = Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))).prepare(walk)
+    assert np.isfinite(ready.measured.wrench).all(axis=1).sum() > 10
 
 
 def test_run_on_a_body_in_space(tmp_path: Path) -> None:

@@ -110,7 +110,7 @@ def test_a_run_gives_what_the_steps_give(name, lag):
     last = slice(max(0, frames - lag - 1), None)  # fewer than the lag follow them: as if smoothed
     np.testing.assert_allclose(out["smoothed_state_sd"][last], smoothed["smoothed_state_sd"][last], rtol=1e-9)
     off = np.abs(out["smoothed_moments"] - smoothed["smoothed_moments"])[last] / smoothed["smoothed_moments_sd"][last]
-    assert off.max() < 1e-5 or name == "bounds"
+    assert off.max() < 1e-8
 
 
 def test_bounds_are_kept_too():

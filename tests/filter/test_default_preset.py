@@ -71,10 +71,10 @@ def test_smoothing_comes_closer_to_the_truth_and_is_surer(
 ) -> None:
     assert rms(smoothed, trial, "speeds").mean() < 0.8 * rms(plain, trial, "speeds").mean()
     assert rms(smoothed, trial, "accelerations").mean() < 0.6 * rms(plain, trial, "accelerations").mean()
-    for name in ("state_sd", "moments_sd"):
+    for name, more in (("state_sd", 1e-9), ("moments_sd", 0.05)):  # what is reported of moments has factors of its own
         live, after = plain.data[name].values, smoothed.data[name].values
-        assert (after <= live * (1.0 + 1e-9)).all() or name == "moments_sd", name
-        assert after.mean() < live.mean()
+        assert (after <= live * (1.0 + more)).all(), name
+        assert (after.mean(axis=0) < live.mean(axis=0)).all(), name
     np.testing.assert_array_equal(smoothed.data["nis"].values, plain.data["nis"].values)
     assert smoothed.config["lag_s"] == smoothed.lag_s == np.inf and smoothed.smoothed
 

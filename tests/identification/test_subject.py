@@ -11,16 +11,20 @@ import pytest
 from dynakin.cli.app import main
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.augment import initial_covariance
+from dynakin.identification import decision
 from dynakin.identification.decision import Decision, decide, parts_of
 from dynakin.identification.report import change_between, change_in_words
 from dynakin.identification.subject import Identification, identify_subject, warned
-from dynakin.identification.trials import measure_all
+from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.messages import note, warning, warnings_of
 from dynakin.model.identified import IdentifiedSubject, read_identified, with_identified
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate
 from support.identification import Case
 from support.squat_estimator import estimator
+
+TABLE, BODIES = np.zeros((1, 6)), np.ones((1, 6))
+"""Predictions that stand for the candidates."""
 
 
 def test_a_subject_is_possible_weighs_the_same_and_survives_its_file(
@@ -49,9 +53,41 @@ def test_a_subject_says_by_how_much_it_predicts_better(identified: Identificatio
             type(held_out).model_validate(held_out.model_dump() | wrong)
 
 
-def test_the_table_is_kept_where_bodies_do_not_predict_better(identified: Identification) -> None:
-    ratios = identified.decision.ratios("bodies")
-    assert (identified.decision.use == "bodies") == bool(ratios.mean() <= 0.97 and ratios.max() <= 1.10)
+@pytest.mark.parametrize(
+    ("parts", "expected"),
+    [
+        ((0.96, 0.97), "bodies"),
+        ((0.99, 0.98), "table"),  # a gain of less than 3 %
+        ((1.0, 1.0), "table"),
+        ((1.09, 0.80), "bodies"),
+        ((1.12, 0.70), "table"),  # one part loses more than 10 %
+    ],
+)
+def test_the_table_is_kept_where_bodies_do_not_predict_better(
+    parts: tuple[float, float], expected: str, case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The bodies' predictions are made so many times as far off as the table's, part by part in turn."""
+    factors = iter([factor for factor in parts for _ in range(2)])  # low-passed and in the full band
+
+    def made(common: Common, trial: MeasuredTrial, predicted: np.ndarray) -> np.ndarray:
+        return np.ones(3) if predicted is TABLE else np.full(3, next(factors))
+
+    class Posterior:
+        def __init__(self, wrench: np.ndarray) -> None:
+            self.wrench = lambda common, states: wrench
+
+    monkeypatch.setattr(decision, "parts_of", lambda trials: trials)
+    monkeypatch.setattr(decision, "rms_of", made)
+    candidates = {"table": Posterior(TABLE), "bodies": Posterior(BODIES)}
+    monkeypatch.setattr(decision, "posteriors", lambda common, others: candidates)
+    decided = decide(case.common, case.trials)
+    np.testing.assert_allclose(decided.ratios("bodies"), parts)
+    assert decided.use == expected
+    begins = "The table is kept" if expected == "table" else "The identified segment inertia is used"
+    assert decided.in_words()[-1].startswith(begins)
+
+
+def test_a_gain_is_said_with_its_sign() -> None:
     rms = {"table": np.ones((2, 3)), "bodies": np.full((2, 3), 1.01)}
     said = Decision("table", ("a", "b"), rms, rms).in_words()  # type: ignore[arg-type]
     assert said[-1].startswith("The table is kept: held-out gain -1 %")

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from dynakin.arrays import wrench_about
-from dynakin.recordings.plates.pressure import LOADED_N, Surface, centre_of_pressure, pressed_at
+from dynakin.recordings.plates.pressure import Surface, centre_of_pressure, pressed_at
+from dynakin.recordings.pushes import LOADED_N
 
 
 def test_only_a_moment_about_the_vertical_is_left_and_it_is_the_surfaces_own_point() -> None:

@@ -146,9 +146,22 @@ def test_a_foot_that_changes_once_in_the_window_or_never_has_no_stance_to_count(
     walker = make_walker(ALL)  # the left knee is nowhere measured in a stance
     frames = np.zeros(301, dtype=bool)
     frames[slice(*window)] = True
-    found = counted(walker, frames)
-    assert not found[~frames].any() and found[frames, 0].all() == (moment_sources(walker.data)[frames, 0] == 0).all()
-    assert not found[:, 2].any() or (moment_sources(walker.data)[frames, 2] == 0).all()
+    found, measured = counted(walker, frames), moment_sources(walker.data) == 0
+    throughout = measured[frames].all(axis=0)
+    np.testing.assert_array_equal(throughout, [False, True, False, True, True])
+    assert (found[frames] == throughout).all() and not found[~frames].any()
+
+
+def test_a_stance_that_the_window_cuts_off_does_not_count() -> None:
+    """The knee is measured in it, and derived in the swing before: neither is whole in the window."""
+    walker = make_walker()
+    data = walker.data.copy(deep=True)
+    data["moment_source"][60:70, 2] = DERIVED
+    frames = np.zeros(301, dtype=bool)
+    frames[60:80] = True
+    assert not counted(replace(walker, data=data), frames)[:, 2].any()
+    frames[60:160] = True  # from 70 to 130 it is whole
+    np.testing.assert_array_equal(np.flatnonzero(counted(replace(walker, data=data), frames)[:, 2]), np.arange(70, 130))
 
 
 def test_frames_are_counted_by_leg_and_said_with_the_reason() -> None:

@@ -14,7 +14,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import StreamError
-from dynakin.recordings.plates.pressure import UNLOADED_N
+from dynakin.recordings.pushes import UNLOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import CausalLowPass, latest_before
 from dynakin.simulation.trial import simulate_squat

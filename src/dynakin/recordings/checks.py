@@ -19,7 +19,7 @@ from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.orientation import nearest_axis
 from dynakin.recordings.plates.ground_plate import SHOE_M
 from dynakin.recordings.plates.limits import beyond_limits
-from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
+from dynakin.recordings.pushes import BEARS_N, JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.recordings.weight import TILT_WARNING_DEG, check_steps, check_weight, likely_unit, while_loaded
@@ -36,7 +36,7 @@ OVER_EDGE_M = 0.01
 trials that we have of which 11 kg are missing it is 18 and 27 mm, in the four that show the weight 0."""
 FREE_MOMENT_WARNING_M = 0.05
 """Free moment over vertical force: two feet twisting on the ground rarely exceed 10 N m at 400 N."""
-LYING_N, LYING = (200.0, 4000.0), 0.25
+LYING_N, LYING = (BEARS_N, 4000.0), 0.25
 """Forces of so much on average while they are loaded, as people weigh (more is a unit or scale), and a vertical one of
 less than this part of it: a force across the vertical is at most 1.5 times as large as that by friction
 (`limits`), 4 times leaves room for plates that are tilted or drift, and other axes make it tens of times."""

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.recordings.times import step_of
 
 Array = npt.NDArray[np.float64]
@@ -23,7 +24,6 @@ LARGEST_FORCE_N = 1e5
 """Of one plate: ten tonnes, ten times a landing of the heaviest athlete, and beyond what plates survive."""
 APART_M = 5.0
 """Between the line of a plate's force by its moment and by its centre of pressure: as far as a laboratory is wide."""
-_LOADED_N = 20.0
 LARGEST_MOMENT_NM = 1e8
 """Of one plate, about the laboratory's origin: that force a kilometre away."""
 
@@ -93,7 +93,7 @@ def check_place(name: str, time: Array, force: Array, moment: Array, cop: Array,
     with np.errstate(invalid="ignore"):
         about = moment - np.cross(cop, force)  # the free moment, if they agree; what is across the force moves its line
         across = np.linalg.norm(np.cross(about, force), axis=1)
-        loaded = np.flatnonzero((size > _LOADED_N) & np.isfinite(across))
+        loaded = np.flatnonzero((size > LOADED_N) & np.isfinite(across))
     away = across[loaded] / size[loaded] ** 2
     apart = loaded[away > APART_M]
     if 2 * len(apart) > len(loaded):

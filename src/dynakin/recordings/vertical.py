@@ -15,11 +15,10 @@ from dynakin.arrays import mean_seen
 from dynakin.errors import RecordingError
 from dynakin.recordings.landmarks import FacingPairs, find_marker, mean_position, present_pairs
 from dynakin.recordings.orientation import AXES, axis_vector, nearest_axis, walks
+from dynakin.recordings.pushes import BEARS_N
 from dynakin.recordings.recording import Array, Recording
 
 _MIN_SHARE = 0.8  # how much of a direction an axis must hold to be taken for it (37 deg)
-BEARS_N = 200.0
-"""What plates push together on average, while loaded, from which they bear a person and not a hand or a heel."""
 FLOOR_M = 0.10
 """How far from what bears a person, or from the floor of the standing trial, the lowest marker lies: on a hand, a toe
 or a back that is on the floor 0.02 to 0.08; along any other axis it is where the person happens to be."""

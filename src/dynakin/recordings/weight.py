@@ -7,7 +7,7 @@ import numpy as np
 from dynakin.messages import Findings
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Array, Recording
 from dynakin.units import GRAVITY_M_S2, PERSON_MASS_KG
 

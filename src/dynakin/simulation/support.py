@@ -15,7 +15,9 @@ from dynakin.errors import ConfigError
 Array = NDArray[np.float64]
 
 HALF_PLATE_M = (0.30, 0.20)  # half the length and width of a plate
-LOADED_N = 5.0  # below it a centre of pressure means nothing
+PRESSES_N = 5.0
+"""Below it a simulated push has no centre of pressure. It has no noise yet, so that less is enough than of a measured
+one (`recordings.pushes.LOADED_N`)."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class Footing:
 
 def carried_by_contacts(wrench: Array, support: Support) -> tuple[dict[str, Array], dict[str, Array]]:
     """The wrench (T, 6) about the ground origin shared out: by the contact's name (T, 6), and where each presses
-    (T, 3) m, NaN below `LOADED_N`."""
+    (T, 3) m, NaN below `PRESSES_N`."""
     parts: dict[str, Array] = {}
     on_feet = wrench
     if support.seated is not None:
@@ -81,7 +83,7 @@ def carried_by_contacts(wrench: Array, support: Support) -> tuple[dict[str, Arra
 def pressed_point(wrench: Array, height: Array) -> Array:
     """Centre of pressure (T, 3) m of a wrench (T, 6) about the ground origin, at a height (T,) m."""
     fx, fy, fz = wrench[:, :3].T
-    loaded = fy > LOADED_N
+    loaded = fy > PRESSES_N
     fy = np.where(loaded, fy, np.nan)
     return np.stack([(wrench[:, 5] + height * fx) / fy, height, (height * fz - wrench[:, 3]) / fy], axis=1)
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.errors import StreamError
 from dynakin.filter.samples import Sample
 from dynakin.recordings.limits import FARTHEST_M
-from dynakin.recordings.plates.pressure import UNLOADED_N
+from dynakin.recordings.pushes import UNLOADED_N
 from dynakin.settings.defaults import DELAY_S
 from dynakin.stream.plate_samples import PlateSamples
 from dynakin.stream.sources.clock import Clock, offset_between

@@ -20,7 +20,7 @@ from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.feet.places import foot_places
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.times import span
 from dynakin.settings.contacts import SEAT

@@ -23,7 +23,8 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import FootLoads
-from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
+from dynakin.recordings.plates.pressure import pressed_at
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.settings.contacts import SEAT
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2

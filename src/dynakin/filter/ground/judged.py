@@ -38,7 +38,8 @@ from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
+from dynakin.recordings.plates.pressure import pressed_at
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.settings.contacts import SEAT
 
 Array = npt.NDArray[np.float64]

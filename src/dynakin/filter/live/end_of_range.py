@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.recordings.plates.ground_plate import FLAT_FRAMES
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.pushes import JUDGED_N
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]

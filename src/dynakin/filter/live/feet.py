@@ -26,8 +26,9 @@ from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.pressure import JUDGED_N, pressed_at
+from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.plates.stuck import STILL_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.results.naming import sentence
 from dynakin.settings.noise import Noise
 

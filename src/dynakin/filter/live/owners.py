@@ -10,7 +10,7 @@ from dynakin.recordings.feet.contact import ALONE_M, NEAR_M
 from dynakin.recordings.feet.sharing import BETWEEN_M, SHORTEST_S, beside_m, lies_between, mostly
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
+from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]

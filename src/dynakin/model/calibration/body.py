@@ -20,7 +20,7 @@ from dynakin.recordings.feet.blank import without_blanks
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.feet.zero_offset import without_offsets
 from dynakin.recordings.frame import GroundFrame
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.weight import CONVERT, FORCE_UNITS_N, likely_unit, while_loaded
 from dynakin.settings.subject import Subject

@@ -17,7 +17,8 @@ from dynakin.model.plan import ModelPlan
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import JointPrior
 from dynakin.recordings.frame import GroundFrame
-from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
+from dynakin.recordings.plates.pressure import pressed_at
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.tree import Tree
 

@@ -30,7 +30,7 @@ from dynakin.recordings.feet.who_stands_where import WhoStandsWhere
 from dynakin.recordings.feet.whole_load import plates_bear_all
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, GroundPlate
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.standing import marker_velocities
 

@@ -13,7 +13,7 @@ from dynakin.messages import Message
 from dynakin.recordings.feet.contact import COP_REFUSED_M
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N
+from dynakin.recordings.pushes import JUDGED_N, LOADED_N, UNLOADED_N
 from dynakin.recordings.recording import Array
 
 Flags = npt.NDArray[np.bool_]

@@ -20,7 +20,7 @@ from dynakin.recordings.feet.contact import ALONE_M, FootContact
 from dynakin.recordings.feet.soles import shape_of
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Array, Recording
 
 Flags = npt.NDArray[np.bool_]

@@ -12,7 +12,7 @@ from dynakin.arrays import runs
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.feet.contact import FootContact
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Array
 from dynakin.recordings.times import span, spans
 

@@ -22,7 +22,7 @@ from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.orientation import axis_vector
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.loads import without_wrench
-from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
+from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Recording
 
 Flags = npt.NDArray[np.bool_]

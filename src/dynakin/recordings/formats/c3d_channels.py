@@ -10,7 +10,7 @@ from dynakin.arrays import runs
 from dynakin.messages import Message, note
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Array
 
 Flags = npt.NDArray[np.bool_]

@@ -12,9 +12,10 @@ from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, other_unit, parse_column
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.limits import check_wrench
-from dynakin.recordings.plates.pressure import LOADED_N, UNLOADED_N, Surface, main_axis, plate_from_wrench
+from dynakin.recordings.plates.pressure import Surface, main_axis, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
+from dynakin.recordings.pushes import LOADED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.resampling import ReadOptions, low_pass, reach_s, resample, same_times, touched
 from dynakin.recordings.times import rate_of, settled_times, step_of

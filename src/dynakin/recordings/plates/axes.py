@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.recordings.frame import GroundFrame
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Array, Plate
 
 TURNS: tuple[tuple[str, Array], ...] = (

@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 
 from dynakin.messages import Message, warning
-from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.plates.stuck import without_frames
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Plate, Recording
 
 SAME, SAME_M = 1e-6, 1e-3

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from dynakin.arrays import filled, runs
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N, pressed_at
+from dynakin.recordings.plates.pressure import pressed_at
+from dynakin.recordings.pushes import JUDGED_N, LOADED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 
 Flags = npt.NDArray[np.bool_]

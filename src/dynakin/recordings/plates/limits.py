@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 
 FRICTION = 1.5

@@ -9,17 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.arrays import cross, filled
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.recordings.recording import Array, Plate
-
-UNLOADED_N = 10.0
-"""Push below which a plate is empty: a few times the noise of the usual plates (1 to 3 N), and small against the errors
-that its centre of pressure has there (1 N m of noise moves it by 0.1 m)."""
-LOADED_N = 20.0
-"""Push from which a plate, or a foot, is loaded: its centre of pressure is then known to a few cm (1 N m: 5 cm), which
-is what it takes to say which foot presses."""
-JUDGED_N = 50.0
-"""Push from which something is said of a plate: a load where no foot stands, a force beyond friction, standing. What is
-lighter may be a cable, a step on the edge, a drift; no offset of a plate in order reaches it."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.messages import Message, warning
-from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, main_axis
+from dynakin.recordings.plates.pressure import main_axis
+from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.times import spans
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.files.motion import force_stem, write_sources
 from dynakin.results.files.storage import DECIMALS_OF_LOADS, DIGITS, DIGITS_OF_LOADS, write_storage

@@ -61,14 +61,15 @@ _PACKAGES = ("dynakin", "numpy", "scipy", "xarray", "ezc3d")
 
 def versions() -> dict[str, str]:
     """Versions of dynakin, Python, the system and the packages that touch the numbers."""
-    found = {name: _version(name) for name in _PACKAGES}
+    found = {name: version_of(name) for name in _PACKAGES}
     return found | {
         "python": platform.python_version(),
         "system": f"{platform.system()} {platform.machine()}",
     }
 
 
-def _version(name: str) -> str:
+def version_of(name: str) -> str:
+    """Of an installed package."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:  # run from a source tree that is not installed

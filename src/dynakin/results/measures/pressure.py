@@ -7,7 +7,8 @@ import numpy.typing as npt
 
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, surface_height
 from dynakin.recordings.plates.ground_plate import floor_height as recorded_floor
-from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
+from dynakin.recordings.plates.pressure import pressed_at
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]

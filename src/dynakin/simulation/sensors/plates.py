@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.arrays import cross
-from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
+from dynakin.recordings.pushes import UNLOADED_N
 from dynakin.recordings.recording import Plate
 from dynakin.simulation.bodies.body import Contact
 from dynakin.simulation.sensors.sizes import SensorNoise

@@ -14,7 +14,8 @@ from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.filter.step import Labelled
 from dynakin.model.schema import kinds_of
-from dynakin.recordings.plates.pressure import LOADED_N, pressed_at
+from dynakin.recordings.plates.pressure import pressed_at
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.stream.sinks.base import LiveFrame, Started, Status
 from dynakin.tree import Tree
 

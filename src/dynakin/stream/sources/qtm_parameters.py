@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError, StreamError
-from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.units import length_factor
 
 Array = npt.NDArray[np.float64]

@@ -20,6 +20,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
+from dynakin.studies.engine.build import build
 from dynakin.studies.engine.journal import Journal, writing
 from dynakin.studies.engine.pools import Pool, work
 from dynakin.studies.engine.tasks import Failure, Task
@@ -132,7 +133,7 @@ def belongs_to(dataset: Dataset, options: Options, *, identify: bool = False) ->
     """
     return {
         "what": "batch",
-        "version of dynakin": versions()["dynakin"],
+        "version of dynakin": build(),
         "presets": {name: _stamp(Path(name)) for name in options.presets},
         "--cutoff-hz": options.cutoff_hz,
         "results of single trials": options.files,

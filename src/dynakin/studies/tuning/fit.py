@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from dynakin.errors import ConfigError
 from dynakin.progress import Progress
-from dynakin.results.files.config import versions
 from dynakin.settings.effect import check_effect, without_effect
 from dynakin.settings.noise import Noise
+from dynakin.studies.engine.build import build
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.tuning.likelihood import REACH, Likelihood
@@ -121,7 +121,7 @@ def belongs_to_fit(shared: Shared) -> dict[str, Any]:
     """All that the rows of a fit depend on in addition to their settings, for its journal."""
     return {
         "what": "fit",
-        "version of dynakin": versions()["dynakin"],
+        "version of dynakin": build(),
         "trials": [trial.identity() for trial in shared.trials],
         "settings": shared.base.model_dump(mode="json"),
     }

@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.progress import Progress
-from dynakin.results.files.config import versions
 from dynakin.settings.effect import check_effect
 from dynakin.settings.noise import Noise
+from dynakin.studies.engine.build import build
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool, work
 from dynakin.studies.engine.tasks import Task
@@ -134,7 +134,7 @@ def belongs_to(shared: Shared, axes: Sequence[Axis]) -> dict[str, Any]:
     """All that the rows of a grid depend on, for its journal."""
     return {
         "what": "grid",
-        "version of dynakin": versions()["dynakin"],
+        "version of dynakin": build(),
         "trials": [trial.identity() for trial in shared.trials],
         "settings": shared.base.model_dump(mode="json"),
         "--left-out": shared.left_out,
