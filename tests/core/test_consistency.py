@@ -133,15 +133,45 @@ def nearest_cost(wanted, P, first, planar, margin):
     return min(2 * least_squares(lambda f: root @ (body(f, d, margin) - wanted), s, **tight).cost for s in starts)
 
 
+def nearest_costs(wanted, P, first, planar, _):
+    """By what is tolerated, and by the margin."""
+    return [nearest_cost(wanted, P, first, planar, margin) for margin in (TOLERATED, MARGIN)]
+
+
+# Of bodies in space by their seed: what `nearest_costs` takes up to 4 s for one to find. The nightly
+# test finds them again, and shows what is to be stored of a seed that differs.
+STORED = {
+    0: [0.4558995023, 0.456167825],
+    1: [0.1273722667, 0.1274304676],
+    2: [0.3315171641, 0.3316968211],
+    4: [4.218599144, 4.219051142],
+    5: [0.1981268956, 0.1981733536],
+    6: [6.359135307, 6.359915903],
+    7: [149.9304061, 149.9438293],
+    8: [2.65335866, 2.6536486],
+    9: [3.464171547, 3.464277043],
+    10: [6.234252613, 6.234878958],
+    11: [0.02443535522, 0.02448562383],
+    12: [0.1270552714, 0.1270700505],
+    13: [7.509402856, 7.511077395],
+    14: [17.52519893, 17.52844156],
+    15: [0.02240150623, 0.02242738792],
+}
+
+
+def stored_costs(*given):
+    return STORED[given[-1]]
+
+
 @pytest.mark.parametrize(
-    ("planar", "seeds"),
+    ("planar", "seeds", "costs"),
     [
-        pytest.param(True, range(60), id="plane"),
-        pytest.param(False, range(9), id="space"),
-        pytest.param(False, range(16), id="space, more", marks=pytest.mark.nightly),
+        pytest.param(True, range(60), nearest_costs, id="plane"),
+        pytest.param(False, range(16), stored_costs, id="space"),
+        pytest.param(False, range(16), nearest_costs, id="space, sought", marks=pytest.mark.nightly),
     ],
 )
-def test_the_body_found_is_the_nearest_possible_one(planar, seeds):
+def test_the_body_found_is_the_nearest_possible_one(planar, seeds, costs):
     """Its distance lies between those of the nearest bodies possible by what is tolerated and by the margin."""
     kept = np.array([0, 1, 2, 6]) if planar else np.arange(10)
     tried = 0
@@ -157,8 +187,8 @@ def test_the_body_found_is_the_nearest_possible_one(planar, seeds):
         full[kept] = out.x[here]
         assert np.linalg.eigvalsh(scaled_matrix(full, first, planar)[0])[0] > 0.999 * TOLERATED
         cost = (out.x - x) @ np.linalg.solve(P, out.x - x)
-        least = nearest_cost(x[here], P[here, here], first, planar, TOLERATED)
-        most = nearest_cost(x[here], P[here, here], first, planar, MARGIN)
+        least, most = costs(x[here], P[here, here], first, planar, seed)
+        assert planar or [least, most] == pytest.approx(STORED[seed], rel=1e-6), seed
         assert least * (1 - 1e-6) <= cost <= most * (1 + 1e-6), seed
         tried += 1
     assert tried > 5

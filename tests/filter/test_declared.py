@@ -39,7 +39,12 @@ def person() -> dynakin.ModelDefinition:
 
 @cache
 def sit(seed: int, plates: str) -> SimulatedTrial:
-    return simulate("fullbody", "sit", seed, 11.0, 50.0, 70.0, 1.75, "male", plates=plates)
+    """Of eleven seconds those of its one sit, and half a second of standing before."""
+    whole = simulate("fullbody", "sit", seed, 11.0, 50.0, 70.0, 1.75, "male", plates=plates)
+    (down_and_up,) = whole.truth.repetitions
+    recording = whole.recording.window(down_and_up.start_s - 0.5, down_and_up.end_s)
+    inside = np.isin(whole.recording.time, recording.time)
+    return replace(whole, recording=recording, truth=replace(whole.truth, data=whole.truth.data.isel(time=inside)))
 
 
 @cache

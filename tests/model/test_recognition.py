@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import combinations
 from pathlib import Path
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -95,6 +96,20 @@ def walking(marker_set: str) -> Recording:
 @cache
 def recognised(marker_set: str) -> Recognised:
     return recognise(walking(marker_set))
+
+
+def test_what_is_found_is_kept_with_the_recording_and_no_longer() -> None:
+    recording = replace(walking("plug-in-gait"))
+    found, asked = recognise(recording), recognise(recording, load_marker_set("plug-in-gait"))
+    assert recognise(recording) is found is not asked
+    assert recognise(recording, load_marker_set("plug-in-gait")) is asked
+    legs = [k for k, name in enumerate(recording.marker_names) if "KNE" not in name]
+    names = tuple(recording.marker_names[k] for k in legs)
+    fewer = recognise(replace(recording, marker_names=names, markers=recording.markers[:, legs]))
+    assert fewer.match.names != found.match.names
+    gone = ref(recording)
+    del recording
+    assert gone() is None
 
 
 def exchanged(recording: Recording, one: str, other: str, frames: slice = slice(None)) -> Recording:

@@ -149,7 +149,7 @@ class Common:
                 "identification: the body mass is not known; expected it (--mass), or a standing trial with plates "
                 "(--static): it must not come from the plates of a held-out trial"
             )
-        initial = estimator.start(replace(first, plates=()), static=static).calibrated
+        initial = estimator.start(first.without_plates, static=static).calibrated
         return cls(estimator, initial, reference or first, static or first, _core.Model(initial.spec))
 
     def tracker(self) -> Tracker:
@@ -180,7 +180,7 @@ class Common:
             ModelError, RecordingError: the trial does not fit. DivergenceError: from the filter. LostError: the filter
                 lost the person in too many frames.
         """
-        recording = replace(recording, plates=())
+        recording = recording.without_plates
         start = start_as(self.initial, self.estimator, recording, self.static)
         markers = marker_paths(recording, self.initial, start.ground, lacking=True)
         coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
@@ -240,7 +240,7 @@ class Common:
             raise RecordingError(f"{where}: {other}; expected trials of one person with the same markers")
         if not recording.plates:
             raise RecordingError(f"{where}: no force plates, expected at least one; give its ground forces (--forces)")
-        start = start_as(self.initial, self.estimator, replace(recording, plates=()), self.static)
+        start = start_as(self.initial, self.estimator, recording.without_plates, self.static)
         wrench, doubts = self._measured_wrench(recording, start)
         known_s = np.isfinite(wrench).all(axis=1).sum() / recording.rate
         if doubts and known_s < SHORTEST_S:

@@ -8,10 +8,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from dynakin.errors import DynakinError
 from dynakin.recordings.landmarks import plain_name
@@ -143,14 +143,22 @@ def _common(trial: Recording, other: Recording) -> list[tuple[str, str]]:
 def _apart_m(trial: Recording, other: Recording) -> float | None:
     """Median difference of the distances between markers that move as one in the trial; None of too few."""
     every = -(-trial.n_frames // _FRAMES)
+    common = _common(trial, other)
+    places = np.array([trial.marker(name)[::every] for name, _ in common])  # (M, T, 3)
     apart = []
-    for (a, a_), (b, b_) in combinations(_common(trial, other), 2):
-        here = np.linalg.norm((trial.marker(a) - trial.marker(b))[::every], axis=1)
-        n, here = len(here), here[np.isfinite(here)]
-        if len(here) <= 0.5 * n or here.std() >= _RIGID_M or here.mean() >= _NEAR_M:
-            continue
-        there = np.linalg.norm(other.marker(a_) - other.marker(b_), axis=1)
-        there = there[np.isfinite(there)]
-        if len(there):
-            apart.append(abs(float(np.median(here) - np.median(there))))
+    for k, (_, a) in enumerate(common):
+        distances = np.linalg.norm(places[k + 1 :] - places[k], axis=2)
+        for j in np.flatnonzero(_move_as_one(distances)):
+            here, there = distances[j], np.linalg.norm(other.marker(a) - other.marker(common[k + 1 + j][1]), axis=1)
+            if np.isfinite(there).any():
+                apart.append(abs(float(np.nanmedian(here) - np.nanmedian(there))))
     return float(np.median(apart)) if len(apart) >= _PAIRS else None
+
+
+def _move_as_one(distances: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """(K,) whether two markers hardly move against each other and are near, of distances (K, T) m, in most frames."""
+    seen = np.isfinite(distances)
+    n = np.maximum(seen.sum(axis=1), 1)
+    mean = np.where(seen, distances, 0.0).sum(axis=1) / n
+    variance = (np.where(seen, distances - mean[:, None], 0.0) ** 2).sum(axis=1) / n
+    return np.asarray((n > 0.5 * seen.shape[1]) & (variance < _RIGID_M**2) & (mean < _NEAR_M))

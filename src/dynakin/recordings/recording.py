@@ -246,6 +246,12 @@ class Recording:
         """The same recording with these plates instead of its own, and with further notes."""
         return replace(self, plates=tuple(plates), notes=self.notes + notes)
 
+    @cached_property
+    def without_plates(self) -> Recording:
+        """The same without its plates: one recording however often it is asked for, so that what its markers show is
+        found once."""
+        return replace(self, plates=()) if self.plates else self
+
     def window(self, start_s: float, end_s: float) -> Recording:
         """The part with ``start_s <= time <= end_s``; the times stay as they are.
 

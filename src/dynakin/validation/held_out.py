@@ -143,7 +143,7 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
         ModelError, RecordingError: the trial's markers do not fit the model. DivergenceError: from a filter. LostError:
             a filter lost the person.
     """
-    recording = replace(recording, plates=())
+    recording = recording.without_plates
     setup, measured = identified.setup, identified.initial
     standing = identified.static or identified.recording
     start = start_as(measured, setup.common, recording, standing, identified.ground)

@@ -171,9 +171,7 @@ def _of(estimate: Estimate, name: str, window: npt.NDArray[np.bool_]) -> Array:
 
 def _without_plates(estimator: Estimator, ready: Prepared, recording: Recording, static: Recording | None) -> Array:
     """The total wrench (T, 6) by the motion, of a run that has no plates but the same person."""
-    estimate = estimator.of_person(ready.calibrated).run(
-        replace(recording, plates=()), static=static, lag_s=ready.lag_s
-    )
+    estimate = estimator.of_person(ready.calibrated).run(recording.without_plates, static=static, lag_s=ready.lag_s)
     wrench = _of(estimate, "wrench_estimated", evaluation_window(recording.time))
     return ready.calibrated.ground.wrench_to_ground(estimate.ground.wrench_to_laboratory(wrench))
 

@@ -17,8 +17,8 @@ from dynakin.simulation.trial import simulate
 from dynakin.studies.batch.dataset import read_dataset
 
 TRIAL = "output = 'o'\ntrials = '*.trc'\n[[subjects]]\nname = 'a'\n"
-SUBJECTS, TRIALS, SECONDS, RATE_HZ = 6, 2, 5.0, 50.0
-CORRUPT, SWAPPED = "S3/squat_2", "S6/squat_1"
+SUBJECTS, TRIALS, SECONDS, RATE_HZ = 3, 2, 5.0, 50.0
+CORRUPT, SWAPPED = "S3/squat_2", "S2/squat_1"
 
 
 def swap_plates(path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -62,8 +63,15 @@ class Recognised:
     contents: Mapping[str, Any] | None = None
 
 
+_Found = list[tuple[MarkerSetFile | None, Recognised]]  # by the set that was asked for
+_FOUND: WeakKeyDictionary[Recording, _Found] = WeakKeyDictionary()
+"""Of each recording, as long as it is there: it does not change, and identification and comparisons calibrate on it
+several times. Exchanged labels take seconds to find."""
+
+
 def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recognised:
-    """The markers of a recording by the set that is asked for, or by the built-in one that explains most of its names.
+    """The markers of a recording by the set that is asked for, or by the built-in one that explains most of its names;
+    found once.
 
     Names decide, then the body is asked: markers that lie elsewhere than their names say, or bear each other's names,
     are left out and said. Of sets that explain about as many names one that the body contradicts gives way.
@@ -72,6 +80,16 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
         ModelError: no marker is seen, no set fits, two persons in one file, a size that nobody has, or what is left out
             leaves no pelvis or no leg.
     """
+    known = _FOUND.setdefault(recording, [])
+    for own, found in known:
+        if own == asked:
+            return found
+    found = _recognised(recording, asked)
+    known.append((asked, found))
+    return found
+
+
+def _recognised(recording: Recording, asked: MarkerSetFile | None) -> Recognised:
     where = str(recording.path or recording.name)
     if not recording.seen.any():
         raise ModelError(f"{where}: no marker is seen in {recording.n_frames} frames, expected those of a person")
