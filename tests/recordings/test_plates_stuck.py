@@ -39,7 +39,9 @@ def recorded(*plates: Plate) -> Recording:
     return Recording("made", None, T, ("A",), np.zeros((N, 1, 3)), plates, "m", ())
 
 
-def edited(plate: Plate, force: dict[int, float] | None = None, cop: dict[int, float] | None = None) -> Plate:
+def edited(
+    plate: Plate, force: dict[int, float | np.ndarray] | None = None, cop: dict[int, float] | None = None
+) -> Plate:
     """A plate some of whose axes are constant."""
     f, place = plate.force.copy(), np.nan_to_num(plate.cop)
     for axis, value in (force or {}).items():
@@ -47,6 +49,11 @@ def edited(plate: Plate, force: dict[int, float] | None = None, cop: dict[int, f
     for axis, value in (cop or {}).items():
         place[:, axis] = value
     return pressed("dead", f, place)
+
+
+def with_noise(plate: Plate) -> Plate:
+    """A newton of it, in place of what an axis measures."""
+    return edited(plate, force={0: np.random.default_rng(3).normal(size=N)})
 
 
 GOOD = step(0.9)
@@ -62,6 +69,7 @@ PLACE = "its centre of pressure along"
         ),
         (edited(step(0.2), cop={2: 0.1}), f"{PLACE} Z never changes"),
         (edited(step(0.2), force={0: 0.0}), "its Fx never changes"),
+        (with_noise(step(0.2)), "its Fx never changes"),
         (edited(step(0.2), force={0: 0.0, 2: 3.0}), "its Fx and its Fz never change"),
     ],
 )
