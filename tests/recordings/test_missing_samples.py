@@ -18,8 +18,8 @@ FRAMES, PER_FRAME, REACH = 100, 10, 10  # frames that the kernel reaches to each
 def plates(path: Path, lost: slice) -> np.ndarray:
     """Force (T, 3) N of a plate that reads -500 N and a sine, without the samples ``lost``."""
     t = np.arange(FRAMES * PER_FRAME) / (100.0 * PER_FRAME)
-    channels = np.ones((6, len(t)))
-    channels[2] = -500.0 - 100.0 * np.sin(2 * np.pi * 2.0 * t)
+    channels = 1.0 + np.outer([30.0, 20.0, -100.0, 9.0, 8.0, 2.0], np.sin(2 * np.pi * 2.0 * t))
+    channels[2] -= 501.0
     channels[:, lost] = np.nan
     corners = np.array([[200.0, 300, 0], [-200, 300, 0], [-200, -300, 0], [200, -300, 0]])
     write_c3d(

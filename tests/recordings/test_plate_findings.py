@@ -16,6 +16,7 @@ from dynakin.recordings.feet.loads import SWING, UNKNOWN
 from dynakin.recordings.feet.zero_offset import without_offsets
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
+from dynakin.recordings.plates.stuck import without_frames
 from dynakin.recordings.recording import Plate, Recording
 from support.made_steps import FOOT_MARKERS, LABORATORY, Made, MadePlate, Stance, lasting, steps, walk
 
@@ -196,6 +197,10 @@ def test_a_plate_that_reads_nothing_under_a_foot_is_dead() -> None:
     assert sum("reads nothing although the" in t for t in said) == 1
     assert any(t.startswith(f"Warning: {dead.name} reads nothing") for t in said)
     assert not any("reads nothing" in t for t in messages(made))
+    unknown = without_frames(made.plates[1], np.ones(made.n_frames, dtype=bool))
+    assert not any(
+        "reads nothing" in t for t in messages(made.with_plates((made.plates[0], unknown, *made.plates[2:])))
+    )
 
 
 def test_a_drift_below_the_noise_is_no_warning() -> None:

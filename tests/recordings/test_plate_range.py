@@ -17,7 +17,7 @@ FRAMES, PER_FRAME = 200, 10
 T = np.arange(FRAMES * PER_FRAME) / (100.0 * PER_FRAME)
 STEP = np.clip(np.sin(np.pi * (T - 0.5) / 0.8), 0.0, None) * ((T > 0.5) & (T < 1.3))
 """A foot on the plate from 0.5 to 1.3 s, 1 in the middle."""
-PUSH = np.stack([60.0 * STEP, 0.0 * T, -800.0 * STEP, 40.0 * STEP, 20.0 * STEP, 0.0 * T])
+PUSH = np.stack([60.0 * STEP, 10.0 * STEP, -800.0 * STEP, 40.0 * STEP, 20.0 * STEP, 0.0 * T])
 
 
 def recording(path: Path, channels: np.ndarray, kind: int = 2, calibration: np.ndarray | None = None) -> Recording:

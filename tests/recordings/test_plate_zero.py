@@ -17,7 +17,7 @@ from support.made_recordings import standing
 FRAMES, PER_FRAME = 200, 10
 STEP = np.repeat(np.clip(np.sin(np.pi * (np.arange(FRAMES) - 50) / 80.0), 0.0, None), PER_FRAME)
 STEP *= np.repeat((np.arange(FRAMES) > 50) & (np.arange(FRAMES) < 130), PER_FRAME)
-PUSH = np.stack([60.0 * STEP, 0.0 * STEP, -800.0 * STEP, 40.0 * STEP, 20.0 * STEP, 0.0 * STEP])
+PUSH = np.stack([60.0 * STEP, 10.0 * STEP, -800.0 * STEP, 40.0 * STEP, 20.0 * STEP, 0.0 * STEP])
 CORNERS = np.array([[200.0, 300, 0], [-200, 300, 0], [-200, -300, 0], [200, -300, 0]])
 UNITS = ["N"] * 3 + ["Nm"] * 3
 OFFSET = np.array([[15.0], [-20.0], [40.0], [3.0], [2.0], [-0.5]])

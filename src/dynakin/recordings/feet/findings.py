@@ -149,7 +149,8 @@ def _covers(foot: FootContact, first: int, end: int) -> bool:
 
 
 def _dead(time: Array, plate: GroundPlate, feet: Sequence[str], contacts: Contacts, on: Flags) -> Message | None:
-    """Whether a plate reads nothing although a foot stands wholly on it and no other plate carries that."""
+    """Whether a plate reads nothing although a foot stands wholly on it and no other plate carries that. Of one that is
+    not measured there, who left it out says why."""
     if plate.corners is None or (plate.push > UNLOADED_N).any():
         return None
     for k, foot in enumerate(contacts):
@@ -157,7 +158,7 @@ def _dead(time: Array, plate: GroundPlate, feet: Sequence[str], contacts: Contac
             continue
         for first, end in foot.stances:
             own = slice(first, end)
-            if time[end - 1] - time[first] < STANDS_S or on[own, k].any():
+            if time[end - 1] - time[first] < STANDS_S or on[own, k].any() or not plate.known[own].any():
                 continue
             beyond = plate.beyond(foot.outline[own])
             if np.isfinite(beyond).any() and np.nanmax(beyond) == 0.0:

@@ -17,11 +17,13 @@ own and published nowhere.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from dynakin.recordings.plates.dead import LEVER_M, Channels
 from dynakin.recordings.recording import Array
 
 Signal = Literal["force", "moment", "point"]
@@ -33,27 +35,37 @@ class PlateType:
     """One type.
 
     Attributes:
-        channels: how many the file lists.
+        names: of the channels that the file lists, as makers call them: the numbers are those of the sensors.
         outputs: what they hold, after the calibration where there is one.
         calibrated: the matrix (outputs, channels) comes from the file.
         uncalibrated: the type that it is where the file has no matrix, as its channels are calibrated already; None
             where that cannot be.
     """
 
-    channels: int
+    names: tuple[str, ...]
     outputs: tuple[Signal, ...]
     calibrated: bool = False
     uncalibrated: int | None = None
 
+    @property
+    def channels(self) -> int:
+        """How many the file lists."""
+        return len(self.names)
 
+
+_AXES = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+_HOLD = {"Fx": "Fx", "Fy": "Fy", "Fz": "Fz", "My": "Px", "Mx": "Py", "Mz": "Tz"}
+"""What a channel holds, or a part of it: a force, or what tells where along an axis it acts."""
+_KISTLER = ("Fx12", "Fx34", "Fy14", "Fy23", "Fz1", "Fz2", "Fz3", "Fz4")
+_SENSORS = tuple(f"F{axis}{k}" for k in range(1, 5) for axis in "xyz")
 TYPES: dict[int, PlateType] = {
-    1: PlateType(6, ("force",) * 3 + ("point",) * 2 + ("moment",)),
-    2: PlateType(6, _WRENCH),
-    3: PlateType(8, ("force",) * 8),
-    4: PlateType(6, _WRENCH, calibrated=True, uncalibrated=2),
-    5: PlateType(8, _WRENCH, calibrated=True),
-    6: PlateType(12, ("force",) * 12, calibrated=True, uncalibrated=6),
-    7: PlateType(8, ("force",) * 8, calibrated=True, uncalibrated=3),
+    1: PlateType(("Fx", "Fy", "Fz", "Px", "Py", "Tz"), ("force",) * 3 + ("point",) * 2 + ("moment",)),
+    2: PlateType(_AXES, _WRENCH),
+    3: PlateType(_KISTLER, ("force",) * 8),
+    4: PlateType(_AXES, _WRENCH, calibrated=True, uncalibrated=2),
+    5: PlateType(tuple(f"signal {k}" for k in range(1, 9)), _WRENCH, calibrated=True),
+    6: PlateType(_SENSORS, ("force",) * 12, calibrated=True, uncalibrated=6),
+    7: PlateType(_KISTLER, ("force",) * 8, calibrated=True, uncalibrated=3),
 }
 
 
@@ -89,6 +101,39 @@ def plate_wrench(
     to_surface = -origin if origin[2] > 0 else origin
     force = values[:3].T
     return force, values[3:].T + np.cross(force, to_surface)
+
+
+def as_recorded(
+    plate: str,
+    kind: int,
+    channels: Array,
+    push: Array,
+    listed: Sequence[str],
+    *,
+    origin: Array,
+    calibration: Array | None,
+    units: Array,
+) -> Channels:
+    """A plate's channels (C, N) by what each one makes of its wrench.
+
+    Args:
+        push: (N,) N, along its normal. listed: which ones of the file they are, in words. The rest: of `plate_wrench`.
+    """
+    if kind == 1:
+        sizes = units / [1.0, 1.0, 1.0, 1.0, 1.0, LEVER_M]
+    else:
+        alone = np.eye(len(channels))
+        force, moment = plate_wrench(kind, alone, origin=origin, calibration=calibration, units=units)
+        sizes = np.hypot(np.linalg.norm(force, axis=1), np.linalg.norm(moment, axis=1) / LEVER_M)
+    names, used = TYPES[kind].names, np.flatnonzero(sizes > 0.0).tolist()
+    return Channels(
+        plate,
+        push,
+        (channels[used] * sizes[used, None]).T,
+        tuple(f"its {names[k]} ({listed[k]})" for k in used),
+        tuple(_HOLD.get(names[k][:2], names[k]) for k in used),
+        tuple(names[k].startswith("P") for k in used),
+    )
 
 
 def _eight_forces(values: Array, a: float, b: float, depth: float) -> tuple[Array, Array]:

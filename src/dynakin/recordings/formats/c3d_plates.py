@@ -13,41 +13,47 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.c3d_channels import at_end_of_range, zero_frames, zeroed
 from dynakin.recordings.formats.c3d_parameters import Parameters
-from dynakin.recordings.formats.c3d_plate_types import TYPES, plate_wrench
+from dynakin.recordings.formats.c3d_plate_types import TYPES, as_recorded, plate_wrench
+from dynakin.recordings.formats.c3d_units import fitting_moments, unit_factors
 from dynakin.recordings.limits import check_wrench
+from dynakin.recordings.plates.dead import Channels, dead_channels
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words
 from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
-from dynakin.units import force_factor, length_factor, moment_factor
 
-_FACTORS = {"force": force_factor, "moment": moment_factor, "point": length_factor}
-_TAKEN = {"force": "N", "moment": "N times the unit of its points", "point": "the unit of its points"}
-_WORDS = {"force": "forces", "moment": "moments", "point": "centre of pressure"}
 _LASTING_PULL = 0.02
-_CENTRED_M = 0.003
 _OFFSET_WORTH_A_NOTE_N = 5.0
 _MOST_PLATES = 100
 _LEAST_SURFACE_M2 = 1e-4
+_LOOK = "look at its cable and its amplifier, and at this channel in the file"
 
 
 @dataclass(frozen=True)
 class _Raw:
     """One plate at the analog rate, laboratory frame: force (N, 3) N, moment (N, 3) N m about the lab
-    origin."""
+    origin; and its channels as recorded."""
 
     name: str
     force: Array
     moment: Array
     surface: Surface
     corners: Array
+    channels: Channels
+
+    def without(self, lost: npt.NDArray[np.bool_]) -> _Raw:
+        """Not measured (NaN) in these samples (N,)."""
+        force, moment = (np.where(lost[:, None], np.nan, values) for values in (self.force, self.moment))
+        channels = replace(self.channels, push=np.where(lost, np.nan, self.channels.push))
+        return replace(self, force=force, moment=moment, channels=channels)
 
 
 def read_plates(
@@ -109,8 +115,10 @@ def read_plates(
         replace(raw, force=-raw.force, moment=-raw.moment) if turn else raw
         for raw, turn in zip(raws, turned, strict=True)
     ]
+    dead, said = dead_channels([raw.channels for raw in raws], analog_time, 1.0 / step, _LOOK)
+    notes += said
     plates = []
-    for raw in raws:
+    for raw in (raw.without(lost) for raw, lost in zip(raws, dead, strict=True)):
         notes += _offset_note(raw)
         plates.append(_at_marker_times(raw, analog_time, time, options))
     if per_frame > 1 and plates:
@@ -164,12 +172,8 @@ def _raw(
             raise RecordingError(f"it has type {kind} and no calibration in FORCE_PLATFORM:CAL_MATRIX")
         kind = plain
         notes.append(note("plates", f"{name} has no calibration in the file: its channels are taken as calibrated."))
-    factors, known, strange = _factors(parameters, channels, unit_m, kind, calibration)
-    for signal, word in strange:
-        taken = _TAKEN[signal]
-        notes.append(
-            warning("plates", f"{name}: unknown unit {word!r} of its {_WORDS[signal]} in ANALOG:UNITS, {taken} taken.")
-        )
+    factors, known, said = unit_factors(name, parameters, channels, unit_m, kind, calibration)
+    notes += said
     origin, signals = _origin(parameters, k, kind) * unit_m, analog[channels]
     if (zero := zero_frames(parameters, len(markers))) is not None:
         as_it_is, _ = plate_wrench(kind, signals, origin=origin, calibration=calibration, units=factors)
@@ -179,7 +183,7 @@ def _raw(
     half_m = 0.5 * float(np.linalg.norm(corners[0] - corners[2]))
     if TYPES[kind].outputs.count("moment") == 3:
         raw = signals if calibration is None else calibration @ signals
-        factors, said = _fitting_moments(name, raw, factors, known, half_m)
+        factors, said = fitting_moments(name, raw, factors, known, half_m)
         notes += said
     force, moment = plate_wrench(kind, signals, origin=origin, calibration=calibration, units=factors)
     if (ended := at_end_of_range(analog[channels], force[:, 2])).any():
@@ -199,7 +203,12 @@ def _raw(
     force[hung], moment[hung] = np.nan, np.nan
     force_L = force @ R_LP.T
     moment_L = moment @ R_LP.T + np.cross(centre, force_L)
-    return _Raw(name, force_L, moment_L, Surface(centre, normal), corners), notes
+    labels = parameters.texts("ANALOG", "LABELS")
+    listed = [f"channel {c + 1}{''.join(f' of the file, {label!r}' for label in labels[c : c + 1])}" for c in channels]
+    recorded = as_recorded(
+        name, kind, signals, force[:, 2], listed, origin=origin, calibration=calibration, units=factors
+    )
+    return _Raw(name, force_L, moment_L, Surface(centre, normal), corners, recorded), notes
 
 
 def _channels(parameters: Parameters, k: int, wanted: int, count: int) -> list[int]:
@@ -247,10 +256,7 @@ def _without_shared(raws: list[_Raw], shared: dict[str, tuple[list[str], Message
         if not any(_same(own, np.linalg.norm(by_name[other].force, axis=1)) for other in others):
             lost |= {name, *others}
             notes.append(said)
-    nothing = {name: np.full_like(by_name[name].force, np.nan) for name in lost}
-    return [
-        replace(raw, force=nothing[raw.name], moment=nothing[raw.name]) if raw.name in lost else raw for raw in raws
-    ], notes
+    return [raw.without(np.full(len(raw.force), raw.name in lost)) for raw in raws], notes
 
 
 def _same(sizes: Array, others: Array) -> bool:
@@ -294,58 +300,6 @@ def _calibration(parameters: Parameters, k: int, kind: int) -> Array | None:
     elif by_row:
         matrix = matrix.T
     return np.asarray(matrix[:rows, :columns])
-
-
-def _fitting_moments(name: str, raw: Array, factors: Array, known: bool, half_m: float) -> tuple[Array, list[Message]]:
-    """Factors (6,) of a plate's raw wrench (6, N), with N m of its moments where by those given it would be pressed at
-    its middle all the time, as nobody stands, and by N m on its surface, of which half a diagonal is given; and what
-    there is to say of it. ``known``: whether the file gives the moments' unit."""
-    if _pressed_within(raw * factors[:, None]) >= _CENTRED_M:
-        return factors, []
-    stays = f"the centre of pressure would stay within {1000.0 * _CENTRED_M:.0f} mm of the plate's centre"
-    newton_metres = np.where(np.arange(6) < 3, factors, 1.0)
-    if _pressed_within(raw * newton_metres[:, None]) > half_m or (newton_metres == factors).all():
-        text = f"{name}: by the unit of its moments {stays}, which nobody does. Correct it in the file."
-        return factors, [warning("plates", text)]
-    if not known:
-        text = f"{name}: the file gives no unit for its moments: N m taken, as else {stays}."
-        return newton_metres, [note("plates", text)]
-    text = f"{name}: by the unit that the file gives for its moments {stays}: N m taken. Correct it in the file."
-    return newton_metres, [warning("plates", text)]
-
-
-def _pressed_within(wrench: Array) -> float:
-    """How far from the middle of its plate a wrench (6, N), N and N m, acts nearly all the time, m; inf where nobody
-    stands on it."""
-    loaded = wrench[:, np.abs(wrench[2]) > JUDGED_N]
-    if not loaded.size:
-        return float("inf")
-    return float(np.percentile(np.hypot(loaded[3], loaded[4]) / np.abs(loaded[2]), 95.0))
-
-
-def _factors(
-    parameters: Parameters, channels: Sequence[int], unit_m: float, kind: int, calibration: Array | None
-) -> tuple[Array, bool, list[tuple[str, str]]]:
-    """Factor to N, N m or m of each output, whether the file gives the moments' unit, and signals with a unit that is
-    not known; by default forces are in N, moments in N times the points' length unit.
-
-    Channels that go through a calibration are in volts, so the unit is that of the calibration, which the file does
-    not name: the default.
-    """
-    factors = {"force": 1.0, "moment": unit_m, "point": unit_m}
-    outputs = TYPES[kind].outputs
-    found = [factors[signal] for signal in outputs]
-    if calibration is not None:
-        return np.array(found), False, []
-    words, given, strange = parameters.texts("ANALOG", "UNITS"), True, dict[tuple[str, str], None]()
-    for spot, (channel, signal) in enumerate(zip(channels, outputs, strict=True)):
-        word = words[channel] if channel < len(words) else ""
-        known = _FACTORS[signal](word)
-        found[spot] = found[spot] if known is None else known
-        given &= signal != "moment" or known is not None
-        if word and known is None:
-            strange[signal, word] = None
-    return np.array(found), given, list(strange)
 
 
 def _offset_note(raw: _Raw) -> list[Message]:

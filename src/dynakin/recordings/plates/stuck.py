@@ -1,14 +1,10 @@
-"""Plates whose data stand still while the load on them does not: rows that repeat (a logger that hung), and channels
-that are dead (a cable, an export without moments).
-
-Frames are frozen by the data at their own rate, before any filter; channels are dead by the plates at the markers'
-rate. A channel that no plate has is no defect: of vertical forces only, or of a movement in a plane.
+"""Plates whose rows repeat while the load on them does not (a logger that hung), seen in the data at their own rate,
+before any filter; and plates that measure vertical forces only. Dead channels: `dead`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +12,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.messages import Message, warning
 from dynakin.recordings.plates.pressure import main_axis
-from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
+from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.times import spans
 
@@ -33,11 +29,9 @@ JUMP, STEPS = 3.0, 5.0
 next to it, and so many times its smallest change (a file may round, and a person stand still)."""
 BEFORE_S = 0.2
 """Where nothing follows, a channel has usually changed by so many smallest changes in the rows of this time before."""
-PRESS_S, CHANGES = 0.2, 0.2
-"""A press so long, through which the vertical force changes by so large a part of its largest value, moves the other
-forces and the centre of pressure: what stands still then is no person."""
-STILL_N, STILL_M = 1e-5, 1e-4
-"""Part of the largest vertical force, and m, within which a channel is constant: noise alone is 0.1 N and 0.2 mm."""
+PRESS_S = 0.2  # of a load that can be judged
+STILL_N = 1e-5
+"""Part of the largest vertical force within which a channel is constant: noise alone is 0.1 N."""
 LACKS, COMES = 0.003, 0.7
 """Part of the largest vertical force that is less, RMS, than a person pushes sideways who comes onto a plate or leaves
 it (the load changes by so large a part): 2 to 14 % in 30 plates of walks and jumps, real and simulated, noise of a
@@ -110,43 +104,6 @@ def frozen_live_in_words(name: str, since_s: float) -> Message:
     )
 
 
-@dataclass(frozen=True)
-class _Press:
-    """A press of a plate, frames [first, end), and which of its level axes stand still: of the force, of the centre of
-    pressure."""
-
-    plate: int
-    first: int
-    end: int
-    force: tuple[bool, bool]
-    cop: tuple[bool, bool]
-
-
-def without_dead_channels(recording: Recording) -> Recording:
-    """The recording without (NaN) the presses of plates of which a channel is dead, and with a warning for each such
-    plate."""
-    if not recording.plates or recording.n_frames < 2:
-        return recording
-    up = main_axis(recording.plates)
-    level = [axis for axis in range(3) if axis != up]
-    presses = [press for p, plate in enumerate(recording.plates) for press in _presses(plate, p, up, level, recording)]
-    if not presses:
-        return recording
-    force, cop = (np.array([getattr(press, what) for press in presses]) for what in ("force", "cop"))
-    none_has = np.all(force, axis=0) & np.all(cop, axis=0)  # in a plane
-    dead_force = force & ~none_has & (not vertical_only(recording))
-    dead_cop = cop & (cop.all(axis=1, keepdims=True) | ~np.all(cop, axis=0))  # both, or one that some press has
-    plates, notes = list(recording.plates), list[Message]()
-    for p, plate in enumerate(recording.plates):
-        own = [k for k, press in enumerate(presses) if press.plate == p and (dead_force[k].any() or dead_cop[k].any())]
-        if not own:
-            continue
-        dead = [(presses[k].first, presses[k].end) for k in own]
-        notes.append(_dead_in_words(recording, plate.name, dead, level, dead_force[own], dead_cop[own]))
-        plates[p] = _without(plate, dead, up)
-    return recording.with_plates(tuple(plates), tuple(notes)) if notes else recording
-
-
 def vertical_only(recording: Recording) -> bool:
     """Whether no plate of a recording measures horizontal forces: they stay what they are but for noise, or the same
     part of the vertical force, on all plates (which lie tilted), while that changes. A load that never changes is made
@@ -166,46 +123,6 @@ def vertical_only(recording: Recording) -> bool:
             return False
         parts.append(part)
     return bool(parts) and bool(np.ptp(parts, axis=0).max() < LEANS)
-
-
-def _presses(plate: Plate, p: int, up: int, level: Sequence[int], recording: Recording) -> list[_Press]:
-    """The presses of a plate that can be judged."""
-    push, found = np.abs(np.nan_to_num(plate.force[:, up])), []
-    for first, end in runs(push > JUDGED_N):
-        own, most = slice(first, end), float(push[first:end].max())
-        if end - first < max(PRESS_S * recording.rate, 3.0) or np.ptp(push[own]) < CHANGES * most:
-            continue
-        places = plate.cop[own][:, level]
-        if not np.isfinite(places).all():
-            continue
-        force, cop = np.ptp(plate.force[own][:, level], axis=0) < STILL_N * most, np.ptp(places, axis=0) < STILL_M
-        found.append(_Press(p, first, end, (bool(force[0]), bool(force[1])), (bool(cop[0]), bool(cop[1]))))
-    return found
-
-
-def _dead_in_words(
-    recording: Recording, name: str, dead: list[tuple[int, int]], level: Sequence[int], force: Flags, cop: Flags
-) -> Message:
-    what = [f"its F{'xyz'[axis]}" for k, axis in enumerate(level) if force[:, k].any()]
-    if cop.any():
-        axes = " and ".join("XYZ"[axis] for k, axis in enumerate(level) if cop[:, k].any())
-        what.append(f"its centre of pressure along {axes}")
-    return warning(
-        "plates",
-        f"{name}: {' and '.join(what)} never change{'s' if len(what) == 1 else ''} while the load on it does, from "
-        f"{spans(recording.time, dead, MOST)}: a channel is dead or was not exported. Not measured there; look "
-        f"at its channels in {recording.plates_file}.",
-    )
-
-
-def _without(plate: Plate, dead: list[tuple[int, int]], up: int) -> Plate:
-    """The plate without these presses, from where it is loaded at all to where it is left."""
-    lost = np.zeros(len(plate.force), dtype=bool)
-    for first, end in runs(np.abs(np.nan_to_num(plate.force[:, up])) > UNLOADED_N):
-        lost[first:end] = any(first <= a < end for a, _ in dead)
-    for first, end in dead:
-        lost[first:end] = True
-    return without_frames(plate, lost)
 
 
 def without_frames(plate: Plate, lost: Flags) -> Plate:

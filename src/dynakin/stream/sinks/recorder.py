@@ -21,7 +21,8 @@ from dynakin.pipeline.result import Result
 from dynakin.pipeline.stages import run_case
 from dynakin.recordings.formats.trajectories import clean_markers
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
-from dynakin.recordings.plates.stuck import frozen_in_words, without_dead_channels
+from dynakin.recordings.plates.dead import without_dead_channels
+from dynakin.recordings.plates.stuck import frozen_in_words
 from dynakin.recordings.recording import Recording
 from dynakin.results.files.folder import check_output_writable
 from dynakin.settings.defaults import DELAY_S
