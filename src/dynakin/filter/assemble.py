@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from dynakin.filter.events import events_of
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.impossible import impossible, impossible_in_words
 from dynakin.filter.labels import labels
+from dynakin.filter.locked import with_locked
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.noise import limit_sd, prior_factor
 from dynakin.filter.parameters import parameters_of
@@ -130,6 +132,8 @@ def assemble(
     events = events_of(whole, parameters, initial, limit_sd(used, used.unseen_sd))  # by what the filter itself believes
     if systematic is not None:
         data = systematic.added_over_time(data, late=bool(config.get("lag_s")))
+        data, said_of_locked = with_locked(data, initial, systematic, Path(config.get("model", "the model")).name)
+        notes = [*notes, *said_of_locked]
     if low_pass is not None:
         data, said = with_taken(data, low_pass, systematic)
         notes = [*notes, said]

@@ -225,7 +225,7 @@ class Systematic:
     def _by_clock(self, x: Array, wrench_rate: Array, segments: Sequence[str]) -> Array:
         """(C,) variances of moments by loads that act a second later than they did; of wrenches that change by (F, 6) a
         second. Moments are linear in them."""
-        load = self._external(wrench_rate, segments)
+        load = self.external(wrench_rate, segments)
         return np.square(
             _core.joint_moments(self._model, x, load) - _core.joint_moments(self._model, x, np.zeros_like(load))
         )
@@ -271,11 +271,11 @@ class Systematic:
         K = change.shape[1]
         found = np.full((len(states), self._count), np.nan)
         for k in np.flatnonzero(np.isfinite(states[:, :K]).all(axis=1)):
-            T = _core.moment_jacobian(self._model, states[k], self._external(wrench[k], segments))
+            T = _core.moment_jacobian(self._model, states[k], self.external(wrench[k], segments))
             found[k] = T[: self._count, :K] @ change[k]
         return found
 
-    def _external(self, wrench: Array, segments: Sequence[str]) -> Array:
+    def external(self, wrench: Array, segments: Sequence[str]) -> Array:
         """(S, 6) by segment of the model: wrenches (F, 6) of contacts on these."""
         external = np.zeros((len(self._segments), 6))
         for name, values in zip(segments, wrench, strict=True):
@@ -296,7 +296,7 @@ class Systematic:
         K = len(self._free)
         if not np.isfinite(x[: 3 * K]).all():
             return {kind: {b: np.full(self._count, np.nan) for b in BLOCKS} for kind in (*KINDS, "inertia")}
-        external = self._external(wrench, segments)
+        external = self.external(wrench, segments)
         still = np.zeros(K)
         by_inertia = self._by_inertia(x, inertia, external)
         by_hands = self._hands.variances(x, self._count) if self.sizes.hands else np.zeros(self._count)
