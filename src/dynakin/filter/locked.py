@@ -166,7 +166,8 @@ def _residuals(data: xr.Dataset, model: _core.Model, states: Array, frames: npt.
     still = states[frames].copy()
     still[:, skin] = still[:, skin].mean(axis=0)
     places = np.array([_core.marker_positions(model, x).ravel() for x in still])
-    return np.nan_to_num(markers[frames].reshape(len(frames), -1) - places)
+    off: Array = np.nan_to_num(markers[frames].reshape(len(frames), -1) - places)
+    return off
 
 
 def _normal(J: Array) -> tuple[Array, bool]:
@@ -211,5 +212,5 @@ def _in_words(
         return note("scaling", f"{text}. That matters little to other angles and moments.")
     return warning(
         "scaling",
-        f"{text}: locked there, the model has {listed(off)} off, and others less. Deviations were widened by as much.",
+        f"{text}: locked there, the model has {listed(off)} off. Deviations were widened by as much.",
     )

@@ -21,7 +21,7 @@ from dynakin.filter.contacts import any_off_plates, late_by, rates, wrenches_of
 from dynakin.filter.error_sizes import CENTRES, KINDS, OF_JOINTS, Sizes, hips_unshown, less_sure_joints, usual_sizes
 from dynakin.filter.in_hands import Hands
 from dynakin.filter.joint_errors import OF_ROOT, JointErrors, drives, floats, neutral, rolls, trunks_of
-from dynakin.filter.limbs import unseen_limbs, unsure_moments
+from dynakin.filter.limbs import Arms, unseen_limbs, unsure_moments
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.filter.reported_sd import BLOCKS, Parts, as_believed, movement_intensity, reported
 from dynakin.messages import Message, warning
@@ -73,6 +73,7 @@ class Systematic:
         reference = neutral(calibrated)
         self._errors = JointErrors.of(spec, reference, calibrated.held, trunks_of(calibrated))
         self._limbs = unsure_moments(unseen_limbs(calibrated), self._errors.massive)
+        self._arms = Arms.of(calibrated)
         self._reference = reference[self._free]
         first = {name: k for k, name in enumerate(calibrated.names)}
         axes = [[f"marker/{marker.name}/{axis}" for axis in "xyz"] for marker in spec.markers]
@@ -174,6 +175,9 @@ class Systematic:
         by_moment = T[:, errors.first_moments]
         for kind, displaced in (("mass_centre", by_moment * errors.masses), ("limbs", by_moment @ self._limbs)):
             found[kind] = self._labelled(still, still, still, np.square(displaced).sum(axis=1))
+        if self._arms:
+            swing = self._arms.variances(self._model, np.r_[q, self._constants[len(q) :]], qd, qdd)
+            found["limbs"]["moments"] = found["limbs"]["moments"] + swing
         return found
 
     def _rolled(self, q: Array) -> Array:
