@@ -861,6 +861,15 @@ def test_a_locked_coordinate_that_stands_still_is_not_accused() -> None:
     assert turned.min() > 0.003 and turned.max() < 0.02  # but what its markers show is no more than that
 
 
+def test_a_coordinate_that_is_locked_at_a_wrong_value_is_said() -> None:
+    """It does not move, but the file's places of markers tell."""
+    subject, data = locked_leg(np.full(60, 0.2))
+    found, (said,) = with_locked(data, subject, Systematic(subject, Noise()), "person.osim")
+    assert said.level == "warning" and "person.osim locks turn 11 deg from where the markers show" in said.text
+    others = found["coordinates_sd"].sel(coordinate=["flexion", "adduction", "knee"])
+    assert (others < 0.011).all()  # an angle's deviation is without its zero
+
+
 def test_a_model_that_locks_nothing_is_left_alone() -> None:
     _, data = locked_leg(np.zeros(50))
     whole = calibrated()
