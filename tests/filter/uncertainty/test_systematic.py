@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -14,10 +15,13 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
+from dynakin.filter.uncertainty.arms import Arms
 from dynakin.filter.uncertainty.frames import _STEP_S, Frame, Frames, any_off_plates
 from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Parts
 from dynakin.filter.uncertainty.joint_errors import OF_ROOT, JointErrors
 from dynakin.filter.uncertainty.loads import HANDS
+from dynakin.filter.uncertainty.locked import with_locked
+from dynakin.filter.uncertainty.mass_centres import unseen_limbs
 from dynakin.filter.uncertainty.reported import (
     OWN_AT_ONCE,
     OWN_LATE,
@@ -35,7 +39,7 @@ from dynakin.filter.uncertainty.upright import hips_turned, neutral, trunks_of
 from dynakin.model.calibration.calibrated import Provenance
 from dynakin.model.calibration.declared import with_loads
 from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
-from dynakin.model.spec import free_names
+from dynakin.model.spec import free_coordinates, free_names
 from dynakin.model.state_priors import COMMON_SKIN
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, in_use
@@ -860,3 +864,106 @@ def test_more_skin_than_usual_counts_for_more_and_less_for_no_less() -> None:
     usual = subject.sizes.skin_found
     assert subject.with_found(0.0, skin=0.5 * usual).sizes == subject.with_found(0.0).sizes == subject.sizes
     assert subject.with_found(0.0, skin=2.0 * usual).sizes == replace(subject.sizes, skin=2.0 * subject.sizes.skin)
+
+
+def locked_leg(turning_rad: Array) -> tuple[Any, xr.Dataset]:
+    """The leg with a hip that its file does not let rotate, and a run over markers of a person who does so: the filter
+    has everything else right."""
+    subject, open_model = calibrated(), _core.Model(spec())
+    subject.spec.coordinates = [_core.CoordinateSpec(c.name, c.value, c.name == "turn") for c in spec().coordinates]
+    model = _core.Model(subject.spec)
+    subject.names, subject.x0 = tuple(model.layout.names), model.initial_state()
+    subject.sd0 = np.zeros(len(subject.names))
+    subject.lower, subject.upper = np.full(27, -np.inf), np.full(27, np.inf)
+    free, time = free_coordinates(subject.spec), np.arange(len(turning_rad)) / 100.0
+    frames, posture = len(time), np.where(np.arange(10) == 8, 0.0, Q)
+    state = np.tile(np.r_[posture[free], np.zeros(18)], (frames, 1))
+    seen = np.array(
+        [_core.marker_positions(open_model, np.r_[posture + a * np.eye(10)[8], np.zeros(20)]) for a in turning_rad]
+    )
+    has = np.array([_core.marker_positions(model, x) for x in state])
+    each = {"coordinate": [c.name for c in subject.spec.coordinates]}
+    data = xr.Dataset(
+        {
+            "state": (("time", "element"), state),
+            "markers_measured": (("time", "marker", "axis"), seen),
+            "markers_estimated": (("time", "marker", "axis"), has),
+            "verdict": (("time", "sensor"), np.zeros((frames, 13), dtype=np.uint8)),
+            "foot_wrench": (("time", "foot", "component"), np.tile(CONTACT, (frames, 1, 1))),
+            **{f"{b}_sd": (("time", "coordinate"), np.tile(0.01 * (np.arange(10) != 8), (frames, 1))) for b in BLOCKS},
+        },
+        coords=each
+        | {
+            "time": time,
+            "coordinate_type": ("coordinate", ["translation"] * 3 + ["rotation"] * 7),
+            "foot_segment": ("foot", ["shank"]),
+        },
+    )
+    return subject, data
+
+
+def test_what_a_person_moves_of_a_locked_coordinate_is_found_said_and_in_the_deviations() -> None:
+    turning = np.radians(8.0) * np.sin(2.0 * np.pi * np.arange(150) / 100.0)
+    subject, data = locked_leg(turning)
+    found, (said,) = with_locked(data, subject, Systematic(subject, Noise()), "person.osim")
+    assert said.level == "warning" and said.topic == "scaling"
+    assert "person.osim locks turn, " in said.text and " 5 deg (root mean square)" in said.text
+    sd = found["coordinates_sd"].sel(coordinate="turn").values
+    assert np.abs(sd - turning.std()).mean() < 0.4 * turning.std()
+    on_neighbours = found["coordinates_sd"].sel(coordinate=["flexion", "adduction", "knee"])
+    assert on_neighbours.max() > 0.02 and (found["moments_sd"] >= data["moments_sd"]).all()
+
+
+def test_a_locked_coordinate_that_stands_still_is_not_accused() -> None:
+    """Skin moves a thigh's markers against the pelvis by as much."""
+    subject, data = locked_leg(np.radians(1.0) * np.sin(2.0 * np.pi * np.arange(150) / 100.0))
+    found, said = with_locked(data, subject, Systematic(subject, Noise()), "person.osim")
+    assert not said
+    others = [name for name in data["coordinate"].values if name != "turn"]
+    for block in BLOCKS:
+        xr.testing.assert_allclose(*(each[f"{block}_sd"].sel(coordinate=others) for each in (found, data)))
+    turned = found["coordinates_sd"].sel(coordinate="turn")
+    assert turned.min() > 0.003 and turned.max() < 0.02  # but what its markers show is no more than that
+
+
+def test_a_coordinate_that_is_locked_at_a_wrong_value_is_said() -> None:
+    """It does not move, but the file's places of markers tell."""
+    subject, data = locked_leg(np.full(60, 0.2))
+    found, (said,) = with_locked(data, subject, Systematic(subject, Noise()), "person.osim")
+    assert said.level == "warning" and "person.osim locks turn 11 deg from where the markers show" in said.text
+    others = found["coordinates_sd"].sel(coordinate=["flexion", "adduction", "knee"])
+    assert (others < 0.011).all()  # an angle's deviation is without its zero
+
+
+def test_a_model_that_locks_nothing_is_left_alone() -> None:
+    _, data = locked_leg(np.zeros(50))
+    whole = calibrated()
+    assert with_locked(data, whole, Systematic(whole, Noise()), "person.osim") == (data, [])
+
+
+def test_arms_that_a_file_does_not_have_swing_at_the_joint_below_the_trunk() -> None:
+    person = replace(measured(), plan=None)
+    assert Arms.of(person) is None and Arms.of(measured()) is None
+    gone = set(person.tree.below(*trunks_of(person))) - trunks_of(person)
+    bare = copy(person.spec)
+    bare.segments = [segment for segment in bare.segments if segment.name not in gone]
+    bare.markers = [marker for marker in bare.markers if marker.segment not in gone]
+    kept = {axis.coordinate for segment in bare.segments for axis in segment.axes}
+    bare.coordinates = [c for c in bare.coordinates if c.name in kept]
+    model = _core.Model(bare)
+    armless = replace(person, spec=bare)
+    arms = Arms.of(armless)
+    assert arms is not None and arms.trunk in trunks_of(person)
+    assert 2.0 < arms.mass_kg < 4.0 and 0.2 < arms.reach_m < 0.6
+    assert [*unseen_limbs(armless)[0]] == [arms.trunk] and len(unseen_limbs(armless)) == 2
+    names = [c.name for c in bare.coordinates]
+    free = free_names(bare)
+    still, walking = np.zeros(len(free)), np.zeros(len(free))
+    walking[[free.index("hip_flexion_r"), free.index("hip_flexion_l")]] = 10.0, -10.0
+    x = np.array(model.initial_state())
+    geometry: Any = SimpleNamespace(model=model, x0=x)
+    found = np.sqrt(arms.variances(geometry, (x[: len(free)], still, walking)))
+    spine = [names.index(name) for name in ("lumbar_extension", "lumbar_bending", "lumbar_rotation")]
+    legs = [k for k, name in enumerate(names) if name.startswith(("hip", "knee", "ankle"))]
+    assert found[spine[0]] > 1.5 and found[spine[2]] > 1.5 and not found[legs].any()
+    assert not arms.variances(geometry, (x[: len(free)], still, still)).any()

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.filter.uncertainty.arms import Arms
 from dynakin.filter.uncertainty.frames import Frame
 from dynakin.filter.uncertainty.geometry import Geometry, Parts
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -26,13 +27,17 @@ class MassCentres:
     def __init__(self, geometry: Geometry, calibrated: CalibratedModel) -> None:
         self._geometry = geometry
         self._limbs = unsure_moments(unseen_limbs(calibrated), geometry.errors.massive)
+        self._arms = Arms.of(calibrated)
 
     def variances(self, frame: Frame) -> Parts:
         """Of moments, in one frame."""
         errors = self._geometry.errors
         by_moment = frame.moment_jacobian[:, errors.first_moments]
         sources = (("mass_centre", by_moment * errors.masses), ("limbs", by_moment @ self._limbs))
-        return {kind: self._geometry.of_moments(np.square(displaced).sum(axis=1)) for kind, displaced in sources}
+        found = {kind: np.square(displaced).sum(axis=1) for kind, displaced in sources}
+        if self._arms is not None:
+            found["limbs"] = found["limbs"] + self._arms.variances(self._geometry, frame.motion)
+        return {kind: self._geometry.of_moments(moments) for kind, moments in found.items()}
 
 
 def unseen_limbs(calibrated: CalibratedModel) -> list[dict[str, float]]:
@@ -41,6 +46,9 @@ def unseen_limbs(calibrated: CalibratedModel) -> list[dict[str, float]]:
     A limb has two segments or more, and hangs on a segment that is marked and is not the root: head and hands count as
     still, of what hangs on the root the joint's moment is absent.
     """
+    arms = Arms.of(calibrated)
+    if arms:
+        return [{arms.trunk: arms.mass_kg * arms.reach_m}] * 2
     spec = calibrated.spec
     tree = calibrated.tree
     marked = {marker.segment for marker in spec.markers}

@@ -1,0 +1,98 @@
+"""Arms that a model's file does not have: their mass is the trunk's, and what they do goes through the joint below."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.bindings import _core
+from dynakin.filter.uncertainty.geometry import Geometry
+from dynakin.filter.uncertainty.upright import thighs_of, trunks_of
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.spec import free_names
+
+Array = npt.NDArray[np.float64]
+
+ARM = 0.05
+"""Part of the mass of the person in each arm (de Leva 1996)."""
+REACH, SHOULDERS, APART_OF_SHOULDERS = 0.9, 1.3, 0.6
+"""How far an arm's centre of mass hangs from its shoulder, how high shoulders lie, and how far to the side, over the
+height of the trunk's centre of mass above the joint below it."""
+SWING = 1.0
+"""Size of the arms' angular acceleration over that of the thighs, times 1 / `Sizes.limbs`. Chosen for simulated walk 1
+of a model without arms; walks 2 and 3 and a squat judge (docs/validation/deviations.md)."""
+STRIDE_RAD_S = 6.0
+"""Rhythm of a stride: what moves to it accelerates by so much of its speed a second, a quarter of a stride later."""
+_AXES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Arms:
+    """Arms that a model's file does not have: its trunk does not branch, and has their mass.
+
+    Attributes:
+        trunk: segment that they would hang on, ``k`` its place. mass_kg, reach_m: of each, as in `REACH`.
+        shoulders_m: (2, 3) m, in the axes of the trunk. forwards: (3,) there. legs: places of free rotations of hips.
+    """
+
+    trunk: str
+    k: int
+    mass_kg: float
+    reach_m: float
+    shoulders_m: Array
+    forwards: Array
+    legs: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, calibrated: CalibratedModel) -> Arms | None:
+        """None where the trunk branches, of a model that was measured by its markers, and of one without a trunk."""
+        spec, trunks = calibrated.spec, trunks_of(calibrated)
+        above = [
+            s for s in spec.segments if s.name in {*trunks, *calibrated.tree.below(*trunks)} and s.inertia[0] > 0.0
+        ]
+        carrying = {segment.parent for segment in above}
+        tips = [segment for segment in above if segment.name not in carrying]
+        if calibrated.plan is not None or len(tips) != 1 or not all(spec.markers[0].measured):
+            return None
+        names = [segment.name for segment in spec.segments]
+        trunk = max(above, key=lambda segment: segment.inertia[0])
+        centre = np.array(trunk.inertia[1 : 1 + _AXES]) / trunk.inertia[0]
+        height = float(np.linalg.norm(centre))
+        if not height:
+            return None
+        up, side = centre / height, np.array([0.0, 0.0, 1.0])
+        free, thighs = free_names(spec), thighs_of(calibrated)
+        hips = {a.coordinate for s in spec.segments if s.name in thighs for a in s.axes if a.kind == "rotation"}
+        return cls(
+            trunk.name,
+            names.index(trunk.name),
+            ARM * sum(float(segment.inertia[0]) for segment in spec.segments),
+            REACH * height,
+            height * (SHOULDERS * up + APART_OF_SHOULDERS * np.outer([1.0, -1.0], side)),
+            np.cross(up, side),
+            np.array([place for place, name in enumerate(free) if name in hips], dtype=np.intp),
+        )
+
+    def variances(self, geometry: Geometry, motion: tuple[Array, Array, Array]) -> Array:
+        """(C,) of moments by arms that swing as fast as thighs do, together and against each other.
+
+        Args:
+            motion: free coordinates, their speeds and accelerations (K,).
+        """
+        model, (q, qd, qdd) = geometry.model, motion
+        x = np.concatenate([q, geometry.x0[len(q) :]])
+        turning = np.square(qdd[self.legs]).sum() + STRIDE_RAD_S**2 * np.square(qd[self.legs]).sum()
+        size = SWING * self.mass_kg * self.reach_m * float(np.sqrt(0.5 * turning))  # of each of two
+        rotations, places = _core.segment_poses(model, x)
+        force = size * rotations[self.k] @ self.forwards
+        points = places[self.k] + self.shoulders_m @ rotations[self.k].T
+        each = np.array([np.concatenate([force, np.cross(point, force)]) for point in points])
+        found = np.zeros(len(model.spec.coordinates))
+        for wrench in (each.sum(axis=0), each[0] - each[1]):
+            load = np.zeros((len(rotations), 6))
+            still = _core.joint_moments(model, x, load)
+            load[self.k] = wrench
+            found += np.square(_core.joint_moments(model, x, load) - still)[: len(found)]
+        return found
