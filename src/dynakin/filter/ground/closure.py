@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms_length, runs, widened
-from dynakin.filter.ground.load_ratio import AMPLITUDE, COARSE_HZ, VIGOROUS, load_ratio, window_means
+from dynakin.filter.ground.load_ratio import AMPLITUDE, VIGOROUS, load_ratio, window_means
 from dynakin.filter.ground.mass_centre import REACH_S, low_passed, mass_centre
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.resampling import filled
@@ -115,9 +115,9 @@ def closure(
     axes = np.array(initial.spec.wrench_measured[:3])
     weight = initial.weighed_kg * GRAVITY_M_S2
     need = found.needed_force(initial.weighed_kg)
-    rough = rate < COARSE_HZ or bool(need[judged, 1].max() > VIGOROUS * weight)
-    weighed = (have[:, 1], judged) if rough else (wrench[:, 1], found.known & claimed)
-    amplitude = AMPLITUDE if rough else 0.0
+    vigorous = bool(need[judged, 1].max() > VIGOROUS * weight)
+    weighed = (have[:, 1], judged) if vigorous else (wrench[:, 1], found.known & claimed)
+    amplitude = AMPLITUDE if vigorous else 0.0
     ratio = load_ratio(need[:, 1], *weighed, weight, round(LASTING_S * rate), LASTING, amplitude)
     too_much = _too_much(need[:, 1], have[:, 1], judged, weight, rate)
     declared = may_bear if ratio is None or ratio < 1.0 else may_pull

@@ -23,10 +23,6 @@ VIGOROUS = 1.5
 plates as measured, are right to 0.02, also where one plate shows the middle of a walk's stances alone, which need 0.7
 (five of `truth3d` and another person 0.995 to 1.016; as of runs 1.006 to 1.035)."""
 
-COARSE_HZ = 24.0
-"""Frames a second below which accelerations of any movement are taken as those of a run: they are cut at 6 Hz, and the
-plates have to be, too (simulated walks with cameras of 15 and 20 Hz; 25 Hz and more need it not)."""
-
 
 def load_ratio(
     need: Array, have: Array, judged: Flags, weight: float, window: int, apart: float, amplitude: float
