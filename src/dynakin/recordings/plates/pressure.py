@@ -21,6 +21,9 @@ JUDGED_N = 50.0
 """Push from which something is said of a plate: a load where no foot stands, a force beyond friction, standing. What is
 lighter may be a cable, a step on the edge, a drift; no offset of a plate in order reaches it."""
 
+MOST_OFFSET_N = 2.0 * JUDGED_N
+"""What a plate reads beside the load, at most: a press that stays below it may be nobody's, and shows no place."""
+
 
 @dataclass(frozen=True)
 class Surface:
