@@ -6,7 +6,7 @@ time.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
@@ -117,6 +117,11 @@ def warnings_of(messages: Iterable[Message]) -> list[Message]:
 def notes_of(messages: Iterable[Message]) -> list[Message]:
     """Those that need nothing done."""
     return [message for message in messages if message.level == "note"]
+
+
+def together(names: Sequence[str]) -> str:
+    """Names in one sentence: `a, b and c`."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def as_attributes(messages: Iterable[Message]) -> dict[str, str]:

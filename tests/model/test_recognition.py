@@ -567,6 +567,16 @@ def test_two_persons_are_refused() -> None:
         match_markers(load_marker_set("plug-in-gait"), both, [True] * len(both), "trial")
 
 
+@pytest.mark.parametrize("ends", [("_1", "_2"), (" (1)", " (2)")])
+def test_two_persons_whose_names_differ_in_the_last_word_are_refused(ends: tuple[str, str]) -> None:
+    recording = walking("plug-in-gait")
+    names = tuple(name + end for end in ends for name in recording.marker_names)
+    shifted = np.concatenate([recording.markers, recording.markers + np.array([0.0, 0.0, 1.2])], axis=1)
+    both = replace(recording, marker_names=names, markers=shifted)
+    with pytest.raises(ModelError, match="are a person's each; expected one subject in a recording"):
+        recognise(both)
+
+
 def test_facing_from_right_and_left_hip_alone() -> None:
     recording = walking("coco17")
     match = recognise(recording).match

@@ -188,6 +188,32 @@ def test_analog_channels_and_their_windows(tmp_path: Path) -> None:
     assert any("ANALOG:RATE says 790" in note for note in map(str, recording.notes))
 
 
+@pytest.mark.parametrize(
+    ("scale", "said", "offset"),
+    [
+        (0.1, "UNSIGNED", 32768),
+        (0.1, "UNSIGNED", 40000),
+        (0.1, None, 32768),  # no signed word lies below it
+        (0.1, "UNSIGNED", 2048),  # of 12 bits
+        (0.1, "SIGNED", -5),
+        (0.1, None, -5),
+        (-1.0, "SIGNED", -5),
+        (-1.0, "UNSIGNED", 40000),
+    ],
+)
+def test_analog_words_and_offsets_have_the_sign_that_the_file_gives(
+    tmp_path: Path, scale: float, said: str | None, offset: int
+) -> None:
+    """Integers from -20 to 19 steps of 0.5 about the offset."""
+    steps = np.arange(T) - 20.0
+    words = steps + offset
+    if scale > 0.0:
+        words = (words + 32768.0) % 65536.0 - 32768.0  # as they are written
+    analog = {"SCALE": [0.5], "OFFSET": [offset], "GEN_SCALE": 1.0, "FORMAT": said}
+    path = made_c3d(tmp_path / "a.c3d", BODY, {"ANALOG": analog}, scale=scale, analog=words[None])
+    np.testing.assert_allclose(read(path).analog[0].values, 0.5 * steps)
+
+
 def test_events(tmp_path: Path) -> None:
     times = np.array([[0.0, 0.0, 0.0], [10.3, 10.1, 99.0]])
     event = {"USED": 3, "CONTEXTS": ["Right", "General", "Left"], "LABELS": ["Foot Off", "Go", "Foot Strike"]}

@@ -35,7 +35,7 @@ def plates(path: Path, lost: slice) -> np.ndarray:
     return plate.force
 
 
-@pytest.mark.parametrize("lost", [slice(970, 1000), slice(500, 501), slice(0, 25)])
+@pytest.mark.parametrize("lost", [slice(970, 1000), slice(500, 505), slice(0, 25), slice(0, 1)])
 def test_missing_samples_stay_missing_and_others_as_they_were(tmp_path: Path, lost: slice) -> None:
     whole, found = plates(tmp_path / "a.c3d", slice(0)), plates(tmp_path / "b.c3d", lost)
     assert np.isfinite(whole).all()
@@ -45,6 +45,12 @@ def test_missing_samples_stay_missing_and_others_as_they_were(tmp_path: Path, lo
     away = np.abs(np.arange(FRAMES)[:, None] - inside / PER_FRAME).min(axis=1) > REACH
     assert not missing[away].any() and away.sum() > 50
     np.testing.assert_allclose(found[~missing], whole[~missing], atol=0.05)
+
+
+@pytest.mark.parametrize("lost", [slice(500, 501), slice(503, 507)])
+def test_gaps_of_less_than_half_a_frame_cost_nothing(tmp_path: Path, lost: slice) -> None:
+    whole, found = plates(tmp_path / "a.c3d", slice(0)), plates(tmp_path / "b.c3d", lost)
+    np.testing.assert_allclose(found, whole, atol=0.02)
 
 
 def test_a_plate_without_any_sample_is_missing(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from dynakin import read
+from dynakin.messages import together
 from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.blank import without_blanks
@@ -83,6 +84,47 @@ def test_a_plate_off_its_place_is_said_with_its_offset(x: float, z: float, under
     on = (made.push[:, 1] > 100.0) & (made.recording.time < 1.3)
     assert on.sum() > 50 and (np.isnan(loads.wrench[on, 1]) != under_foot).all()
     assert any("where no foot stands" in text for text in messages(made.recording)) != under_foot
+
+
+@pytest.mark.parametrize(
+    ("turn", "said"),
+    [
+        (np.diag([-1.0, 1.0]), "a wrong sign of My"),
+        (np.diag([1.0, -1.0]), "a wrong sign of Mx"),
+        (-np.eye(2), "a wrong sign of all moments"),
+        (np.array([[0.0, -1.0], [-1.0, 0.0]]), "exchanged Mx and My"),
+    ],
+)
+@pytest.mark.parametrize("names", [("p1",), ("p0", "p1", "p2", "p3")])
+def test_moments_of_the_wrong_sign_are_named(turn: np.ndarray, said: str, names: tuple[str, ...]) -> None:
+    """Plates whose middle lies 0.1 m before the feet and 0.08 m beside them; the right ones are not complained of."""
+    made = beside_the_middle()
+    assert foot_loads(made.recording, LABORATORY, FOOT_MARKERS).turned_moments == ""
+    plates = tuple(mirrored(p, turn) if p.name in names else p for p in made.recording.plates)
+    text = foot_loads(made.recording.with_plates(plates), LABORATORY, FOOT_MARKERS).turned_moments
+    assert text.endswith(said) and f"of {together(names)} does not go with the feet" in text
+
+
+def beside_the_middle() -> Made:
+    feet = walk(4, 0.6)
+    plates = [
+        MadePlate(s.plates[0], (s.x - 0.15, s.x + 0.35), (s.z - 0.12, s.z + 0.28))
+        for side in ("right", "left")
+        for s in feet[side]
+    ]
+    return steps(lasting(4), feet, sorted(plates, key=lambda plate: plate.name))
+
+
+def mirrored(plate: Plate, turn: np.ndarray) -> Plate:
+    """With its centre of pressure turned so along its axes and about its middle."""
+    assert plate.corners is not None
+    middle, along = plate.corners.mean(axis=0)[[0, 2]], (plate.corners[0] - plate.corners[1])[[0, 2]]
+    along = along / np.linalg.norm(along)
+    rows = np.array([along, [-along[1], along[0]]])
+    cop = plate.cop.copy()
+    cop[:, [0, 2]] = (cop[:, [0, 2]] - middle) @ rows.T @ turn.T @ rows + middle
+    moment = np.cross(np.nan_to_num(cop), plate.force) + plate.free_moment
+    return replace(plate, cop=cop, moment=moment)
 
 
 def zeroed(recording: Recording) -> tuple[Recording, list[str]]:

@@ -122,3 +122,13 @@ def test_a_plate_that_is_loaded_wherever_the_feet_are_is_to_be_zeroed() -> None:
     )
     assert found.refusal is not None and "plate 3 reads 60 N and never nothing, wherever the feet are" in found.refusal
     assert "zero it with nobody on it" in found.refusal
+
+
+@pytest.mark.parametrize(("offset_n", "kept_n"), [(-30.0, -30.0), (30.0, 0.0), (-3.0, 0.0)])
+def test_what_a_plate_reads_below_nothing_is_kept_in_mind(tmp_path: Path, offset_n: float, kept_n: float) -> None:
+    """It is 0 while the plate is empty, as no plate pulls, and missing under a foot."""
+    path = tmp_path / "a.c3d"
+    channels = PUSH.copy()
+    channels[2] -= offset_n
+    zeroed(path, channels, (), {"LHEE": np.tile([0.0, 0.0, 0.6], (FRAMES, 1))})
+    assert read_c3d(path).plates[0].empty_n == pytest.approx(kept_n, abs=0.5)

@@ -483,6 +483,82 @@ def test_moments_in_another_unit_than_the_file_says(
     assert away == pytest.approx(0.2 if factor != 0.001 else 0.0, abs=0.01)
 
 
+def made_plates(path: Path, kind: int, channels: np.ndarray, origins: list[list[float]], units: str = "") -> Recording:
+    """Plates side by side, the same corners for all, each with these channels."""
+    count = len(origins)
+    return read(
+        write_c3d(
+            path,
+            body(),
+            kinds=[kind] * count,
+            channels=np.tile(channels, (count, 1)),
+            corners=[turned(R_LP)] * count,
+            origins=origins,
+            analog_units=[units] * (count * len(channels)) if units else (),
+        )
+    )
+
+
+@pytest.mark.parametrize("spot", [0, 3])
+def test_a_sample_without_a_number_says_nothing_about_units(tmp_path: Path, spot: int) -> None:
+    """Nor does it cost more than itself, and no frame where it is shorter than one."""
+    channels = channels_of(2)
+    channels[spot, 55] = np.nan
+    recording = made_plates(tmp_path / "a.c3d", 2, channels, [origin_of(2)])
+    said = list(map(str, recording.notes))
+    assert not [text for text in said if "unit" in text]
+    assert [text for text in said if "bridged by straight lines (samples without a number: 1)" in text]
+    np.testing.assert_allclose(recording.total_wrench(), np.tile(expected_wrench(R_LP), (T, 1)), rtol=1e-4, atol=2e-2)
+    channels[spot, 50:80] = np.nan  # too long to be bridged
+    recording = made_plates(tmp_path / "b.c3d", 2, channels, [origin_of(2)])
+    assert not [text for text in map(str, recording.notes) if "unit" in text or "bridged" in text]
+    assert np.isnan(recording.total_wrench()[5:8]).all()
+
+
+def test_sensors_beyond_the_edges_have_been_exchanged(tmp_path: Path) -> None:
+    """Half widths are 200 and 300 mm: 210 along x lies beyond, and along y within."""
+    a, b = 210.0, 150.0
+    recording = made_plates(tmp_path / "a.c3d", 3, channels_of(3), [[a, b, -40.0], [b, a, -40.0], [a, b, -40.0]])
+    assert [plate.name for plate in recording.plates] == ["plate 2"]
+    (said,) = [text for text in map(str, recording.notes) if "left out" in text]
+    assert said.startswith(
+        "Warning: plate 1 and plate 3 left out: by FORCE_PLATFORM:ORIGIN its sensors lie 210 and 150 mm"
+    )
+    assert "edges 200 and 300 mm: a and b have been exchanged" in said
+
+
+def test_sensors_beyond_the_edges_either_way_are_said(tmp_path: Path) -> None:
+    recording = made_plates(tmp_path / "a.c3d", 3, channels_of(3), [[320.0, 350.0, -40.0]])
+    assert len(recording.plates) == 1
+    assert (
+        len([text for text in map(str, recording.notes) if "Warning: plate 1: by FORCE_PLATFORM:ORIGIN" in text]) == 1
+    )
+
+
+@pytest.mark.parametrize(
+    ("origins", "said"),
+    [
+        ([[np.nan] * 3] * 2, "plate 1 and plate 2 left out: FORCE_PLATFORM:ORIGIN holds no numbers for it"),
+        ([[0.0, 0.0, -40.0]] * 2, "plate 1 and plate 2 left out: FORCE_PLATFORM:ORIGIN has its sensors on its axes"),
+    ],
+)
+def test_plates_that_are_left_out_for_one_reason_are_said_once(
+    tmp_path: Path, origins: list[list[float]], said: str
+) -> None:
+    recording = made_plates(tmp_path / "a.c3d", 3, channels_of(3), origins)
+    assert not recording.plates
+    assert len([text for text in map(str, recording.notes) if said in text]) == 1
+
+
+def test_volts_that_are_none_are_a_note(tmp_path: Path) -> None:
+    recording = made_plates(tmp_path / "a.c3d", 2, channels_of(2), [origin_of(2)] * 2, "V")
+    (said,) = [text for text in map(str, recording.notes) if "volts" in text or "unknown unit" in text]
+    assert said.startswith("plate 1 and plate 2: the channels read up to")
+    small = made_plates(tmp_path / "b.c3d", 2, 1e-4 * channels_of(2), [origin_of(2)] * 2, "V")
+    strange = [text for text in map(str, small.notes) if "unknown unit 'V'" in text]
+    assert len(strange) == 2 and strange[0].startswith("Warning: plate 1 and plate 2: unknown unit 'V' of its forces")
+
+
 def test_a_weight_at_the_middle_of_a_plate_is_no_other_unit(tmp_path: Path) -> None:
     """In N m it would lie beyond the edges."""
     recording = stands_aside(tmp_path / "a.c3d", 2, "Nmm", 1000.0, aside_m=0.002)

@@ -11,5 +11,7 @@ is what it takes to say which foot presses, or where a force acts."""
 JUDGED_N = 50.0
 """Push from which something is said of a plate: a load where no foot stands, a force beyond friction, standing. What is
 lighter may be a cable, a step on the edge, a drift; no offset of a plate in order reaches it."""
+MOST_OFFSET_N = 2.0 * JUDGED_N
+"""What a plate reads beside the load, at most: a press that stays below it may be nobody's, and shows no place."""
 BEARS_N = 200.0
 """What plates push together on average, while loaded, from which they bear a person and not a hand or a heel."""

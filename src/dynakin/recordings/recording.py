@@ -84,6 +84,8 @@ class Plate:
         cop: (T, 3) m, centre of pressure; NaN where the plate is unloaded.
         free_moment: (T, 3) N m, what is left of the moment about the centre of pressure.
         corners: (4, 3) m, or None where the file does not give them.
+        empty_n: what it read with nobody on it, N, where that was below 0 and its reader made it 0: under a foot it
+            still reads so much too little.
     """
 
     name: str
@@ -92,6 +94,7 @@ class Plate:
     cop: Array
     free_moment: Array
     corners: Array | None = None
+    empty_n: float = 0.0
 
     def __post_init__(self) -> None:
         for key in ("force", "moment", "cop", "free_moment"):

@@ -9,6 +9,7 @@ import numpy.typing as npt
 import scipy
 from scipy.linalg import blas
 
+from dynakin.arrays import runs
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.recording import Array
 from dynakin.recordings.times import rate_of, step_of
@@ -57,6 +58,18 @@ def filled(samples: Array, missing: npt.NDArray[np.bool_]) -> Array:
         return samples
     at = np.arange(len(samples))
     return np.column_stack([np.interp(at, at[~missing], column[~missing]) for column in samples.T])
+
+
+def bridged(samples: Array, most: int) -> tuple[Array, int]:
+    """Samples (N, k) with lines over gaps (rows that hold no number) of at most so many that have neighbours on both
+    sides, and how many they are. Longer ones stay."""
+    missing = np.asarray(~np.isfinite(samples).all(axis=1))
+    short = np.zeros_like(missing)
+    for first, end in runs(missing):
+        short[first:end] = first > 0 and end < len(samples) and end - first <= most
+    if not short.any():
+        return samples, 0
+    return np.where(short[:, None], filled(samples, missing), samples), int(np.count_nonzero(short))
 
 
 def touched(missing: npt.NDArray[np.bool_], time_in: Array, time_out: Array, reach_s: float) -> npt.NDArray[np.bool_]:

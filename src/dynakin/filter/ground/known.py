@@ -14,7 +14,7 @@ from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in
 from dynakin.filter.ground.fine_delay import UNKNOWN_S, clock_delay
 from dynakin.filter.ground.judged import Ground, judged
 from dynakin.filter.ground.on_ground import GroundTrial, OnGround
-from dynakin.filter.ground.plate_sum import MASS_APART, doubtful_mass, mean_load_kg
+from dynakin.filter.ground.plate_sum import MASS_APART, Empty, doubtful_mass, mean_load_kg
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.blank import without_blanks
@@ -70,7 +70,7 @@ def known_ground(
     behind_s = 0.0 if clock.taken is None else clock.taken.delay_s
     notes = (*zeros, *moved, *ground.notes, *clock.notes)
     load_kg = mean_load_kg(known, least=50) if ground.load_ratio is None else ground.load_ratio * initial.weighed_kg
-    doubt = None if load_kg is None else doubtful_mass(initial, load_kg)
+    doubt = None if load_kg is None else doubtful_mass(initial, load_kg, Empty.of(trial.recording.plates, known))
     return replace(ground, notes=notes, behind_s=behind_s, clock_sd_s=clock.sd_s, doubt=doubt), known
 
 

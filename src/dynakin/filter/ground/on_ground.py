@@ -24,6 +24,7 @@ from dynakin.recordings.feet.assignment import check_assigned, foot_loads
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.plates.stuck import vertical_only
 from dynakin.recordings.recording import Recording
+from dynakin.results.naming import sentence
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -56,6 +57,12 @@ class GroundTrial:
     def without_plates(self) -> GroundTrial:
         """The same of the markers alone."""
         return replace(self, recording=self.recording.with_plates(()), assigned=None)
+
+
+_CORRECT_MOMENTS = (
+    "Correct the signs or the order of the plates' channels, or of their corners, in this file; if something else "
+    "presses the plate, declare it (--contact)"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,10 +111,11 @@ class OnGround:
         mass = None if initial.feet else initial.weighed_kg
         steps_kg = initial.weighed_kg if initial.feet and not initial.contacts else None
         check = check_plates(recording, initial.ground, mass, initial.foot_markers, loads, steps_kg)
+        turned = "" if loads is None or initial.contacts else loads.turned_moments
+        turned = f"{turned}. {_CORRECT_MOMENTS}" if turned else ""
         if check.refusal:
-            raise RecordingError(
-                f"{recording.plates_file}: {check.refusal}{_how_to_give(initial, loads, check.under_no_foot)}"
-            )
+            why = f". {sentence(turned)}" if turned else _how_to_give(initial, loads, check.under_no_foot)
+            raise RecordingError(f"{recording.plates_file}: {check.refusal}{why}")
         if check.unused:
             return replace(found, check=check)
         shear = Shear(unmeasured=True) if vertical_only(recording) else NO_SHEAR
@@ -121,6 +129,8 @@ class OnGround:
             wrong = turned_axes(needed, recording.plates, initial, loads.total_known)
             if wrong:
                 raise RecordingError(f"{recording.plates_file}: {wrong}")
+        if turned:  # by the forces as well where the corners are
+            raise RecordingError(f"{recording.plates_file}: {turned}")
         return replace(found, check=check, shear=shear, needed=needed)
 
     def coarse_delay(self) -> Delay | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -18,9 +19,11 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.recording import Recording
+from dynakin.recordings.pushes import LOADED_N
+from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.times import spans
 from dynakin.recordings.weight import likely_unit
+from dynakin.results.naming import listed
 from dynakin.settings.contacts import SEAT
 from dynakin.units import GRAVITY_M_S2
 
@@ -218,12 +221,42 @@ def _stands_alone(loads: FootLoads, k: int, frames: slice) -> bool:
     return bool((standing[:, k] & (standing.sum(axis=1) == 1)).mean() > 0.5)
 
 
-def doubtful_mass(initial: CalibratedModel, load_kg: float) -> Message | None:
-    """Sentences where what the plates carry contradicts the mass."""
+class Empty(NamedTuple):
+    """What plates read below 0 with nobody on them: which, how much, and by how much the mean load is too small."""
+
+    names: str
+    reads: str
+    kg: float
+
+    @staticmethod
+    def of(plates: Sequence[Plate], measured: Array) -> Empty:
+        """Of the frames in which the total wrench (T, 6) is known."""
+        known = np.isfinite(measured).all(axis=1)
+        read = {plate.name: plate.empty_n for plate in plates if plate.empty_n < 0.0}
+        if not read or not known.any():
+            return EMPTY
+        bears = [np.linalg.norm(plate.force[known], axis=1) > LOADED_N for plate in plates]
+        short = sum(plate.empty_n * float(own.mean()) for plate, own in zip(plates, bears, strict=True))
+        low, high = (f"{most:.0f} N" for most in (min(read.values()), max(read.values())))
+        return Empty(listed(list(read)), low if low == high else f"{low} to {high}", short / GRAVITY_M_S2)
+
+
+EMPTY = Empty("", "", 0.0)
+
+
+def doubtful_mass(initial: CalibratedModel, load_kg: float, empty: Empty = EMPTY) -> Message | None:
+    """Sentences where what the plates carry contradicts the mass; of their zero where it is that which does."""
     mass_kg = initial.weighed_kg
     within = MASS_APART + UNSEEN_APART * initial.unseen_kg / mass_kg
     if abs(load_kg - mass_kg) <= within * mass_kg:
         return None
+    if empty.names and abs(load_kg - empty.kg - mass_kg) <= within * mass_kg:
+        return warning(
+            "zero",
+            f"with nobody on them {empty.names} read {empty.reads}, which was not taken off, and as much too little "
+            f"under a foot: with it the plates carry {load_kg - empty.kg:.1f} kg on average, as it is {load_kg:.1f} kg "
+            f"where the person weighs {mass_kg:.1f} kg. Forces, moments and inertia take the error on.",
+        )
     carried = ", or a load is carried (moments of back and arms are wrong by it)" if load_kg > mass_kg else ""
     return warning(
         "weight",

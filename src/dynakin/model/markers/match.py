@@ -18,6 +18,7 @@ MarkerKey = tuple[str, str]
 SIDES = ("right", "left", "centre")
 _SIDE_WORDS = {"r": "right", "right": "right", "l": "left", "left": "left"}
 _SEPARATORS = re.compile(r"[\s._\-()]+")
+_LAST_WORD = re.compile(r"[ _.:-]+")
 _UNLABELLED = re.compile(r"(?:\*|(?:unlabel|uname|unnamed|unidentified)).*", re.IGNORECASE)
 _FEWEST_OF_A_PERSON = 3  # names behind a prefix by which it counts as a person's
 
@@ -237,6 +238,17 @@ def _persons(own: dict[str, str]) -> dict[str, str]:
     if len(groups) < 2 or sizes[0] < _FEWEST_OF_A_PERSON or 2 * len(in_all) < sizes[-1]:
         return {}
     return {name: rest for name, (_, rest) in split.items()}
+
+
+def by_last_word(names: Iterable[str]) -> dict[str, list[str]]:
+    """Last word of names ("2" of "LASI_2", "(2)" of two markers of one name) -> what stands before it, of words that as
+    many names have as a person needs."""
+    groups: dict[str, list[str]] = defaultdict(list)
+    for name in names:
+        parts = _LAST_WORD.split(name.strip())
+        if len(parts) > 1 and not is_unlabelled(name):
+            groups[parts[-1]].append(name.strip()[: -len(parts[-1]) - 1])
+    return {word: rests for word, rests in groups.items() if len(rests) >= _FEWEST_OF_A_PERSON}
 
 
 def _side_and_rest(name: str) -> tuple[str, str]:

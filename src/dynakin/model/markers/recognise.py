@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from dynakin.errors import ModelError, RecordingError
-from dynakin.messages import Message, note, warning
+from dynakin.messages import Message, note, together, warning
 from dynakin.model.markers.anatomy import anatomy, enlarged
 from dynakin.model.markers.draft.draft import drafted, further
 from dynakin.model.markers.draft.guess import Guess, names_of
@@ -27,6 +27,7 @@ from dynakin.model.markers.marker_set import contents_of, set_of
 from dynakin.model.markers.match import (
     MarkerKey,
     MarkerMatch,
+    by_last_word,
     letters_of_sides,
     match_markers,
     without_prefix,
@@ -112,6 +113,7 @@ def _unasked(recording: Recording, where: str) -> Recognised:
     try:
         usable = usable_of(ranked, where)
     except ModelError as unknown:
+        _refuse_several(recording, where)
         return _guessed(recording, unknown)
     best: Recognised | None = None
     for fit in usable:
@@ -132,6 +134,21 @@ def _unasked(recording: Recording, where: str) -> Recognised:
     messages = [note("marker set", choice), *said, *best.messages, *half_marked_words(best.match)]
     match = replace(best.match, guessed=tuple(guess.recorded for guess in doubtful))
     return replace(best, match=match, messages=tuple(messages))
+
+
+def _refuse_several(recording: Recording, where: str) -> None:
+    """Where names that end in one word, and those that end in another, are those of a person each.
+
+    Raises:
+        ModelError: two persons in one file.
+    """
+    persons = {word: own for word, own in by_last_word(recording.seen_names).items() if fits(own)[0].usable}
+    if len(persons) > 1:
+        words = together([repr(word) for word in persons])
+        raise ModelError(
+            f"{where}: the names that end in {words} are a person's each; expected one subject in a recording: export "
+            "one person's markers only"
+        )
 
 
 def recognise_standing(static: Recording, recording: Recording, known: Recognised) -> Recognised:

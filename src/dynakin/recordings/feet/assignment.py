@@ -26,6 +26,7 @@ from dynakin.recordings.feet.like_the_other import like_the_other
 from dynakin.recordings.feet.loads import FootLoads, divided
 from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
+from dynakin.recordings.feet.turned_moments import turned_moments
 from dynakin.recordings.feet.who_stands_where import WhoStandsWhere
 from dynakin.recordings.feet.whole_load import plates_bear_all
 from dynakin.recordings.frame import GroundFrame
@@ -379,4 +380,5 @@ class _Assignment:
                     f"No markers of the {' and '.join(missing)} foot: nobody sees whether it stands off the plates.",
                 )
             )
-        return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons))
+        turned = turned_moments(contacts, [self.plates[p] for p in own], self.recording.rate)
+        return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons), turned_moments=turned)

@@ -15,10 +15,9 @@ from dynakin.arrays import runs
 from dynakin.messages import Message, warning
 from dynakin.recordings.feet.contact import NEAR_M, FootContact
 from dynakin.recordings.feet.soles import LONGEST_M, Soles, shape_of
-from dynakin.recordings.feet.zero_offset import MOST_OFFSET_N
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
+from dynakin.recordings.pushes import JUDGED_N, MOST_OFFSET_N, UNLOADED_N
 from dynakin.recordings.recording import Array
 from dynakin.recordings.times import span
 

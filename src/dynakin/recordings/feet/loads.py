@@ -49,6 +49,7 @@ class FootLoads:
         others: declared contact -> (T, 6) wrench of the plates that were given to it, as ``wrench``; of one that it
             shares an equal part.
         messages: sentences with times. reasons: those of them that say why something is not measured.
+        turned_moments: why the plates' moments cannot be what the file says; "" where nothing speaks against them.
     """
 
     feet: tuple[str, ...]
@@ -64,6 +65,7 @@ class FootLoads:
     others: Mapping[str, Array] = field(default_factory=dict)
     messages: tuple[Message, ...] = ()
     reasons: tuple[Message, ...] = ()
+    turned_moments: str = ""
 
     @property
     def sharing(self) -> list[tuple[str, ...]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
+from dynakin.recordings.formats.c3d_analog import analog_values
 from dynakin.recordings.formats.c3d_beside import first_frame, read_analog, read_events, read_subject
 from dynakin.recordings.formats.c3d_checks import check_c3d_file
 from dynakin.recordings.formats.c3d_parameters import Parameters
@@ -116,7 +117,7 @@ def _recording(data: Any, path: Path, options: ReadOptions, notes: list[Message]
         )
 
     time = np.arange(frames) / rate
-    analog = np.asarray(data["data"]["analogs"], dtype=float)[0]  # (channels, samples)
+    analog = analog_values(data, parameters)
     plates, plate_notes = read_plates(parameters, analog, time, markers, factor, options)
     events, event_notes = read_events(parameters, first / rate, time)
     said = [*notes, *found.notes, *start_notes, *unit_notes, *doubled_notes, *missing_notes, *plate_notes, *event_notes]

@@ -44,8 +44,9 @@ def at_end_of_range(channels: Array, push: Array) -> Flags:
 def _at_end(values: Array, loaded: Flags, same: float) -> Flags:
     """(N,) where values (N,), the same within a part of their range, rest at their largest one."""
     found = np.zeros(len(values), dtype=bool)
-    top, size = float(np.max(values)), float(np.ptp(values))
-    if not (np.isfinite(size) and size > 0.0):
+    known = values[np.isfinite(values)]
+    top, size = float(np.max(known, initial=-np.inf)), float(np.ptp(known)) if len(known) else 0.0
+    if not size > 0.0:
         return found
     at_top: Flags = np.asarray(values >= top - same * size)
     flat = [(first, end) for first, end in runs(at_top) if end - first >= FLAT and first > 0 and end < len(values)]
@@ -106,7 +107,7 @@ def zeroed(
     samples = slice(frames.start * per_frame, frames.stop * per_frame)
     if why := _in_use(force[samples], markers[frames], corners, normal):
         return channels, [note("plates", f"{name}: {why} in {which}: they are not taken for its zero.")]
-    mean = channels[:, samples].mean(axis=1, keepdims=True)
+    mean = np.nanmean(channels[:, samples], axis=1, keepdims=True)
     return channels - mean, [note("plates", f"{name}: its mean in {which} was taken off as its zero.")]
 
 
@@ -117,6 +118,9 @@ def _in_use(force: Array, markers: Array, corners: Array, normal: Array) -> str 
         return "no marker is seen"
     if _somebody_over(markers, corners, normal):
         return "a foot is over it"
+    force = force[np.isfinite(force).all(axis=1)]
+    if not len(force):
+        return "it is not measured"
     load, spread = float(np.linalg.norm(force.mean(axis=0))), float(np.ptp(force, axis=0).max())
     if load <= JUDGED_N and spread <= JUDGED_N:
         return None

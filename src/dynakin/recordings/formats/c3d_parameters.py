@@ -35,6 +35,15 @@ class Parameters:
         except (TypeError, ValueError):
             return np.empty(0)
 
+    def continued(self, group: str, name: str) -> npt.NDArray[np.float64]:
+        """Values as numbers in one list, continued in NAME2, NAME3, ... as C3D does beyond 255 of them."""
+        parts = [self.array(group, name).ravel()]
+        for number in range(2, 100):
+            if not len(parts[-1]):
+                break
+            parts.append(self.array(group, f"{name}{number}").ravel())
+        return np.concatenate(parts)
+
     def number(self, group: str, name: str) -> float | None:
         """First value as a number, None where there is none."""
         values = self.array(group, name).ravel()

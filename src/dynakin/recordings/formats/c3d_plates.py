@@ -8,7 +8,6 @@ turned.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -16,25 +15,40 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
-from dynakin.messages import Message, note, warning
+from dynakin.messages import Message, note, together, warning
 from dynakin.recordings.formats.c3d_channels import at_end_of_range, zero_frames, zeroed
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plate_types import TYPES, as_recorded, plate_wrench
-from dynakin.recordings.formats.c3d_units import fitting_moments, unit_factors
+from dynakin.recordings.formats.c3d_plate_units import (
+    Strange,
+    fitting_moments,
+    strange_in_words,
+    units_of,
+    volts,
+)
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.dead import Channels, dead_channels
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words
-from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
+from dynakin.recordings.pushes import JUDGED_N, MOST_OFFSET_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate
-from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
+from dynakin.recordings.resampling import (
+    CausalLowPass,
+    ReadOptions,
+    bridged,
+    filled,
+    low_pass,
+    reach_s,
+    resample,
+    touched,
+)
 
-_LASTING_PULL = 0.02
-_OFFSET_WORTH_A_NOTE_N = 5.0
 _MOST_PLATES = 100
+_LASTING_PULL, _LEAST_IDLE, _OFFSET_WORTH_A_NOTE_N = 0.02, 0.05, 5.0
 _LEAST_SURFACE_M2 = 1e-4
 _LOOK = "look at its cable and its amplifier, and at this channel in the file"
+_WITHIN_EDGES = 1.01  # corners are measured, distances of sensors a maker's
 
 
 @dataclass(frozen=True)
@@ -47,6 +61,7 @@ class _Raw:
     moment: Array
     surface: Surface
     corners: Array
+    strange: Strange
     channels: Channels
 
     def without(self, lost: npt.NDArray[np.bool_]) -> _Raw:
@@ -94,7 +109,7 @@ def read_plates(
         ]
     step = (time[1] - time[0]) / per_frame if len(time) > 1 else 1.0
     analog_time = np.arange(analog.shape[1]) * step + time[0]
-    raws, numbers, notes = [], list[int](), []
+    raws, numbers, notes, left_out = [], list[int](), [], dict[str, list[str]]()
     for k in range(int(used)):
         name = f"plate {k + 1}"
         try:
@@ -102,11 +117,16 @@ def read_plates(
             check_wrench(name, analog_time, raw.force, raw.moment, "")
         except RecordingError as error:
             why = str(error).removeprefix(": ").removeprefix(f"{name} ")
-            notes.append(warning("plates", f"{name} left out: {why}."))
+            left_out.setdefault(why, []).append(name)
             continue
         raws.append(raw)
         numbers.append(k)
         notes += said
+    notes = [
+        *(warning("plates", f"{together(names)} left out: {why}.") for why, names in left_out.items()),
+        *strange_in_words({raw.name: raw.strange for raw in raws}),
+        *notes,
+    ]
     raws, said = _without_shared(raws, shared_channels(parameters, numbers))
     notes += said
     turned = pulling([raw.force @ raw.surface.normal for raw in raws])
@@ -119,8 +139,9 @@ def read_plates(
     notes += said
     plates = []
     for raw in (raw.without(lost) for raw, lost in zip(raws, dead, strict=True)):
-        notes += _offset_note(raw)
-        plates.append(_at_marker_times(raw, analog_time, time, options))
+        empty_n, said = _while_empty(raw)
+        notes += said
+        plates.append(replace(_at_marker_times(raw, analog_time, time, options), empty_n=empty_n))
     if per_frame > 1 and plates:
         how = "zero-phase FIR low-pass"
         if options.causal and len(time) > 1:
@@ -167,26 +188,30 @@ def _raw(
     notes = []
     if TYPES[kind].calibrated and calibration is None:
         plain = TYPES[kind].uncalibrated
-        units = {word for c in channels for word in parameters.texts("ANALOG", "UNITS")[c : c + 1]}
-        if plain is None or any(re.fullmatch(r"[munk\u00b5]?v(olts?)?", word.casefold()) for word in units):
+        words = {word for c in channels for word in parameters.texts("ANALOG", "UNITS")[c : c + 1]}
+        if plain is None or any(map(volts, words)):
             raise RecordingError(f"it has type {kind} and no calibration in FORCE_PLATFORM:CAL_MATRIX")
         kind = plain
         notes.append(note("plates", f"{name} has no calibration in the file: its channels are taken as calibrated."))
-    factors, known, said = unit_factors(name, parameters, channels, unit_m, kind, calibration)
+    measured, said = _bridged(name, analog[channels], analog.shape[1] // len(markers))
     notes += said
-    origin, signals = _origin(parameters, k, kind) * unit_m, analog[channels]
+    units = units_of(parameters, channels, measured, unit_m, kind, calibration is not None)
+    origin, said = _origin(name, parameters, k, kind, corners, unit_m)
+    notes += said
+    signals = measured
     if (zero := zero_frames(parameters, len(markers))) is not None:
-        as_it_is, _ = plate_wrench(kind, signals, origin=origin, calibration=calibration, units=factors)
+        as_it_is, _ = plate_wrench(kind, signals, origin=origin, calibration=calibration, units=units.factors)
         points = "point" in TYPES[kind].outputs
         signals, said = zeroed(name, signals, as_it_is, zero, markers, corners, normal, points=points)
         notes += said
     half_m = 0.5 * float(np.linalg.norm(corners[0] - corners[2]))
+    factors = units.factors
     if TYPES[kind].outputs.count("moment") == 3:
         raw = signals if calibration is None else calibration @ signals
-        factors, said = fitting_moments(name, raw, factors, known, half_m)
+        factors, said = fitting_moments(name, raw, units, half_m)
         notes += said
     force, moment = plate_wrench(kind, signals, origin=origin, calibration=calibration, units=factors)
-    if (ended := at_end_of_range(analog[channels], force[:, 2])).any():
+    if (ended := at_end_of_range(measured, force[:, 2])).any():
         seconds = np.count_nonzero(ended) * step_s
         notes.append(
             warning(
@@ -198,7 +223,7 @@ def _raw(
             )
         )
         force[ended], moment[ended] = np.nan, np.nan
-    hung = frozen(analog[channels].T, force[:, 2], 1.0 / step_s)
+    hung = frozen(measured.T, force[:, 2], 1.0 / step_s)
     notes += frozen_in_words(name, np.asarray(np.arange(len(hung)) * step_s + start_s, dtype=float), hung)
     force[hung], moment[hung] = np.nan, np.nan
     force_L = force @ R_LP.T
@@ -208,7 +233,7 @@ def _raw(
     recorded = as_recorded(
         name, kind, signals, force[:, 2], listed, origin=origin, calibration=calibration, units=factors
     )
-    return _Raw(name, force_L, moment_L, Surface(centre, normal), corners, recorded), notes
+    return _Raw(name, force_L, moment_L, Surface(centre, normal), corners, units.strange, recorded), notes
 
 
 def _channels(parameters: Parameters, k: int, wanted: int, count: int) -> list[int]:
@@ -220,6 +245,15 @@ def _channels(parameters: Parameters, k: int, wanted: int, count: int) -> list[i
         said = ", ".join(f"{number:g}" for number in numbers)
         raise RecordingError(f"lists channels [{said}], expected {wanted} of 1 to {count}")
     return [int(number) - 1 for number in numbers]
+
+
+def _bridged(name: str, signals: Array, per_frame: int) -> tuple[Array, list[Message]]:
+    """Channels (C, N) with straight lines over gaps of less than half a marker's frame, and a note of these."""
+    found, count = bridged(signals.T, (per_frame - 1) // 2)
+    if not count:
+        return signals, []
+    text = f"{name}: gaps shorter than half a frame are bridged by straight lines (samples without a number: {count})."
+    return found.T, [note("plates", text)]
 
 
 def shared_channels(parameters: Parameters, plates: Sequence[int]) -> dict[str, tuple[list[str], Message]]:
@@ -266,14 +300,39 @@ def _same(sizes: Array, others: Array) -> bool:
 def _slice(values: Array, k: int, size: int, key: str) -> Array:
     """The ``size`` numbers of plate k in file order (first index fastest)."""
     flat = values.ravel(order="F")
+    if not len(flat):
+        raise RecordingError(f"the file has no FORCE_PLATFORM:{key}")
     if len(flat) < size * (k + 1):
         raise RecordingError(f"FORCE_PLATFORM:{key} has {len(flat)} numbers, it needs {size * (k + 1)}")
     return flat[size * k : size * (k + 1)]
 
 
-def _origin(parameters: Parameters, k: int, kind: int) -> Array:
-    """Of plate k, in the file's unit; type 1 needs none."""
-    return np.zeros(3) if kind == 1 else _slice(parameters.array("FORCE_PLATFORM", "ORIGIN"), k, 3, "ORIGIN")
+def _origin(
+    name: str, parameters: Parameters, k: int, kind: int, corners: Array, unit_m: float
+) -> tuple[Array, list[Message]]:
+    """Of plate k, m, and what there is to say of it; type 1 needs none. Of types 3, 6 and 7 it holds how far its
+    sensors lie from its axes, which is within its edges by the corners (4, 3) m."""
+    if kind == 1:
+        return np.zeros(3), []
+    origin = _slice(parameters.array("FORCE_PLATFORM", "ORIGIN"), k, 3, "ORIGIN") * unit_m
+    if not np.isfinite(origin).all():
+        raise RecordingError("FORCE_PLATFORM:ORIGIN holds no numbers for it")
+    if TYPES[kind].outputs.count("force") == 3:
+        return origin, []
+    sensors = np.abs(origin[:2])
+    edges = 0.5 * np.linalg.norm([corners[0] - corners[1], corners[0] - corners[3]], axis=1)
+    if not (sensors > 0.0).all():
+        raise RecordingError("FORCE_PLATFORM:ORIGIN has its sensors on its axes (a, b), where none lie")
+    if (sensors <= _WITHIN_EDGES * edges).all():
+        return origin, []
+    (a, b), (x, y) = 1000.0 * sensors, 1000.0 * edges
+    text = (
+        f"by FORCE_PLATFORM:ORIGIN its sensors lie {a:.0f} and {b:.0f} mm (a, b) from its middle, by the corners its "
+        f"edges {x:.0f} and {y:.0f} mm"
+    )
+    if (sensors[::-1] <= _WITHIN_EDGES * edges).all():
+        raise RecordingError(f"{text}: a and b have been exchanged. Exchange them, or correct the corners, in the file")
+    return origin, [warning("plates", f"{name}: {text}: sensors lie within. Correct what is wrong in the file.")]
 
 
 def _calibration(parameters: Parameters, k: int, kind: int) -> Array | None:
@@ -302,23 +361,23 @@ def _calibration(parameters: Parameters, k: int, kind: int) -> Array | None:
     return np.asarray(matrix[:rows, :columns])
 
 
-def _offset_note(raw: _Raw) -> list[Message]:
+def _while_empty(raw: _Raw) -> tuple[float, list[Message]]:
+    """What a plate reads while nobody is on it where that is below 0 (N; 0: it is not), and what there is to say."""
     push = raw.force @ raw.surface.normal
-    idle = np.abs(push) < JUDGED_N
-    pulls = push < -JUDGED_N
+    known = np.nan_to_num(push, nan=np.inf)
+    idle = (known > -MOST_OFFSET_N) & (known < JUDGED_N)
+    middle = float(np.median(push[idle])) if idle.mean() >= _LEAST_IDLE else 0.0
+    below = middle if middle < -_OFFSET_WORTH_A_NOTE_N else 0.0
+    pulls = known < -JUDGED_N
     if pulls.mean() > _LASTING_PULL:
-        return [
-            warning(
-                "plates",
-                f"{raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in "
-                f"{100.0 * pulls.mean():.0f} % of the recording: taken as empty there. Zero it before the trial.",
-            )
-        ]
-    if idle.mean() < 0.05 or np.abs(np.median(push[idle])) < _OFFSET_WORTH_A_NOTE_N:
-        return []
-    return [
-        note("plates", f"{raw.name} reads {np.median(push[idle]):.3g} N where nobody stands on it (not taken off).")
-    ]
+        text = (
+            f"{raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in {100.0 * pulls.mean():.0f} % "
+            "of the recording: taken as empty there. Zero it before the trial."
+        )
+        return below, [warning("plates", text)]
+    if abs(middle) < _OFFSET_WORTH_A_NOTE_N:
+        return 0.0, []
+    return below, [note("plates", f"{raw.name} reads {middle:.3g} N where nobody stands on it (not taken off).")]
 
 
 def _at_marker_times(raw: _Raw, time_in: Array, time: Array, options: ReadOptions) -> Plate:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -66,4 +67,4 @@ def without_wrench(plate: Plate, wrench: Array, up: Array) -> Plate:
     seen = points[np.isfinite(points).all(axis=1)]
     surface = Surface(np.median(seen, axis=0) if len(seen) else np.zeros(3), up)
     cop, free = centre_of_pressure(force, moment, surface, UNLOADED_N)
-    return Plate(plate.name, force, moment, cop, free, plate.corners)
+    return replace(plate, force=force, moment=moment, cop=cop, free_moment=free, empty_n=0.0)
