@@ -3,8 +3,8 @@ it is, but for noise, while the load on its plate changes.
 
 A live channel moves smoothly with whoever stands there, and far above its noise; a dead one does not, whatever noise it
 carries. Judged are the channels as they were recorded where a file has them (C3D), in the plate's own axes and at its
-sensors; else the horizontal forces and centres of pressure along the laboratory's axes. What no plate has at all is no
-defect where a movement in a plane, or plates of vertical forces only, explain it.
+sensors; else whether horizontal forces and centres of pressure along the laboratory's axes are constant.
+What no plate has at all is no defect where a movement in a plane, or plates of vertical forces only, explain it.
 """
 
 from __future__ import annotations
@@ -178,7 +178,8 @@ def without_dead_channels(recording: Recording) -> Recording:
 def _of_wrench(plate: Plate, up: int, level: Sequence[int]) -> Channels:
     """Of a plate at the markers' rate, along the laboratory's axes."""
     push = plate.force[:, up]
-    values = np.hstack([plate.force[:, level], plate.cop[:, level]])
+    most = float(np.max(np.abs(push), initial=JUDGED_N, where=np.isfinite(push)))
+    values = np.hstack([plate.force[:, level] / most * STILL_M / STILL_N, plate.cop[:, level]])  # still alike
     names = [*(f"its F{'xyz'[k]}" for k in level), *(f"its centre of pressure along {'XYZ'[k]}" for k in level)]
     holds = [f"{what}{'xyz'[k]}" for what in "FP" for k in level]
-    return Channels(plate.name, push, values, tuple(names), tuple(holds), (False, False, True, True))
+    return Channels(plate.name, push, values, tuple(names), tuple(holds), (True,) * 4)  # a seat may push up alone
