@@ -126,6 +126,7 @@ STILL = np.tile([[0.0], [0.0], [-400.0], [1.0], [2.0], [0.0]], len(T))
 NOISE = np.random.default_rng(4).normal(scale=0.2, size=STILL.shape)
 ONLY_UP = np.array([[0.0], [0.0], [1.0], [1.0], [1.0], [0.0]])
 IN_A_PLANE = np.array([[1.0], [0.0], [1.0], [0.0], [1.0], [0.0]])
+NO_SHEAR_ACROSS = np.array([[1.0], [0.0], [1.0], [1.0], [1.0], [1.0]])  # simulated, beside the middle of the plates
 FREE_MOMENT = np.array([[1.0], [1.0], [1.0], [1.0], [1.0], [0.0]])
 
 
@@ -136,6 +137,7 @@ FREE_MOMENT = np.array([[1.0], [1.0], [1.0], [1.0], [1.0], [0.0]])
         (in_steps(walked(0.2, 1)), in_steps(walked(1.1, 2))),
         (squatted(1), squatted(2)),
         (in_steps(squatted(1)), in_steps(squatted(2))),
+        tuple(NO_SHEAR_ACROSS * squatted(k) + NOISE for k in (1, 2)),
         (STILL, STILL + NOISE),  # nobody moves
         (walked(0.2, 1), NOISE),  # nobody is there
         *(tuple(part * walked(at, 1) + NOISE for at in (0.2, 1.1)) for part in (ONLY_UP, IN_A_PLANE, FREE_MOMENT)),

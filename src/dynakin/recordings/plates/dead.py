@@ -3,8 +3,8 @@ it is, but for noise, while the load on its plate changes.
 
 A live channel moves smoothly with whoever stands there, and far above its noise; a dead one does not, whatever noise it
 carries. Judged are the channels as they were recorded where a file has them (C3D), in the plate's own axes and at its
-sensors; else the horizontal forces and centres of pressure along the laboratory's axes. What no plate has at all is no
-defect where a movement in a plane, or plates of vertical forces only, explain it.
+sensors; else whether horizontal forces and centres of pressure along the laboratory's axes are constant.
+What no plate has at all is no defect where a movement in a plane, or plates of vertical forces only, explain it.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.times import spans
 
 Flags = npt.NDArray[np.bool_]
+Levels = npt.NDArray[np.int_]
+STILL, NOISE, FOLLOWS, CLEAR = range(4)  # how a channel is, beside the load
 
 PRESS_S, CHANGES = 0.2, 0.2
 """A press so long, through which the vertical force changes by so large a part of its largest value, moves the other
@@ -38,6 +40,9 @@ scatter within them, are noise: it has 1. Live channels have 45 and more at 1000
 people who stand still among them), 22 and more at 100 Hz (simulated walks), horizontal forces in tables 12 and more.
 Walks of one simulated subject and real data chose; walks and squats of five others judged, each channel dead in turn,
 also rounded to 1 N: 720 of 720 found, no right one accused."""
+CLEARLY = 4.0
+"""So many times that somewhere, and the plates hold it: who is simulated and squats in a plane pushes sideways by noise
+alone, or hardly more, which is no defect."""
 STILL_M = 1e-4
 """What a centre of pressure stays within that is none: noise alone moves it by 0.2 mm."""
 LEVER_M = 0.3
@@ -68,8 +73,8 @@ class Channels:
     holds: tuple[str, ...]
     places: tuple[bool, ...]
 
-    def presses(self, rate_hz: float) -> list[tuple[int, int, Flags]]:
-        """First frame, end and dead channels (C,) of each press that can be judged."""
+    def presses(self, rate_hz: float) -> list[tuple[int, int, Levels]]:
+        """First frame, end and how the channels (C,) are, for each press that can be judged."""
         push, found = np.abs(np.nan_to_num(self.push)), []
         for first, end in runs(push > JUDGED_N):
             own, most = slice(first, end), float(push[first:end].max())
@@ -78,9 +83,8 @@ class Channels:
                 continue
             if np.isfinite(self.values[own]).all():
                 parts = self.values[own] * np.where(self.places, STILL_N / STILL_M, 1.0 / most)
-                moves = np.asarray(np.ptp(parts, axis=0) >= STILL_N)
-                follows = moves & (_follows(parts, change, rate_hz) | self.places)
-                found.append((first, end, ~follows))
+                level = np.where(self.places, CLEAR, _level(parts, change, rate_hz))
+                found.append((first, end, np.where(np.ptp(parts, axis=0) < STILL_N, STILL, level)))
         return found
 
     def loaded(self, dead: Sequence[tuple[int, int]], *, always: bool) -> Flags:
@@ -91,18 +95,18 @@ class Channels:
         return lost
 
 
-def _follows(parts: Array, change: float, rate_hz: float) -> Flags:
-    """(C,) channels, as parts (N, C) of the largest load, that move with it, and not as noise does, while it changes by
-    a part of that; all where this is too short to tell."""
+def _level(parts: Array, change: float, rate_hz: float) -> Levels:
+    """(C,) whether channels, as parts (N, C) of the largest load, are as noise is while that changes by a part of
+    itself, or follow it; `FOLLOWS` where this is too short to tell."""
     size = max(round(BLOCK_S * rate_hz), 3)
     count = len(parts) // size
     if count < BLOCKS:
-        return np.ones(parts.shape[1], dtype=bool)
+        return np.full(parts.shape[1], FOLLOWS)
     blocks = parts[: count * size].reshape(count, size, -1)
     means = blocks.mean(axis=1)
-    noise = blocks.var(axis=1, ddof=1).mean(axis=0) / size
-    smooth = np.asarray(means.var(axis=0, ddof=1) >= LIKE_NOISE * noise)
-    return np.asarray(smooth & (means.std(axis=0) >= LEAST)) if change > COMES else smooth
+    noise, found = blocks.var(axis=1, ddof=1).mean(axis=0) / size, means.var(axis=0, ddof=1)
+    level = np.where(found < LIKE_NOISE * noise, NOISE, np.where(found < CLEARLY * LIKE_NOISE * noise, FOLLOWS, CLEAR))
+    return np.where(means.std(axis=0) < LEAST, NOISE, level) if change > COMES else level
 
 
 def dead_channels(
@@ -111,12 +115,12 @@ def dead_channels(
     """For each plate the frames (N,) in which it is not measured as a channel is dead, and a warning for each that has
     some. ``look``: where to look for the reason. ``vertical``: they are known to measure vertical forces only."""
     presses = [plate.presses(rate_hz) for plate in plates]
-    judged = [(plate, dead) for plate, own in zip(plates, presses, strict=True) for _, _, dead in own]
+    judged = [(plate, level) for plate, own in zip(plates, presses, strict=True) for _, _, level in own]
     missing = _missing(judged, vertical=vertical)
     lost, notes = [], list[Message]()
     for plate, own in zip(plates, presses, strict=True):
         counted = np.array([what not in missing for what in plate.holds], dtype=bool)
-        flags = np.array([dead & counted for _, _, dead in own]).reshape(len(own), len(counted))
+        flags = np.array([(level <= NOISE) & counted for _, _, level in own]).reshape(len(own), len(counted))
         dead = [(first, end) for (first, end, _), here in zip(own, flags, strict=True) if here.any()]
         always = bool(len(own)) and bool(flags.all(axis=0).any())
         lost.append(plate.loaded(dead, always=always) if dead else np.zeros(len(plate.push), dtype=bool))
@@ -126,19 +130,20 @@ def dead_channels(
     return lost, notes
 
 
-def _missing(judged: Sequence[tuple[Channels, Flags]], *, vertical: bool) -> set[str]:
+def _missing(judged: Sequence[tuple[Channels, Levels]], *, vertical: bool) -> set[str]:
     """What no plate holds in any press, and need not: of a movement in a plane, or of vertical forces only."""
 
-    def nowhere(what: str) -> bool:
-        return all(what in plate.holds and dead[[h == what for h in plate.holds]].all() for plate, dead in judged)
+    def nowhere(what: str, least: int) -> bool:
+        own = [level[[held == what for held in plate.holds]] for plate, level in judged]
+        return all(len(level) and (level < least).all() for level in own)
 
-    absent = {what for plate, _ in judged for what in plate.holds if nowhere(what)}
+    absent = {what for plate, _ in judged for what in plate.holds if nowhere(what, CLEAR)}
     sensed = {what for plate, _ in judged for what, place in zip(plate.holds, plate.places, strict=True) if not place}
 
     def explained(what: str) -> bool:
         others = {other[0] for other in absent if other != what and other[0] == what[0]}
         if what[0] == "F":
-            return vertical or bool(others) or f"P{what[1]}" in absent
+            return vertical or bool(others) or f"P{what[1]}" in absent or not nowhere(what, NOISE)
         return what[0] != "P" or (not others and (what not in sensed or f"F{what[1]}" in absent))
 
     return {what for what in absent if explained(what)}
@@ -174,7 +179,8 @@ def without_dead_channels(recording: Recording) -> Recording:
 def _of_wrench(plate: Plate, up: int, level: Sequence[int]) -> Channels:
     """Of a plate at the markers' rate, along the laboratory's axes."""
     push = plate.force[:, up]
-    values = np.hstack([plate.force[:, level], plate.cop[:, level]])
+    most = float(np.max(np.abs(push), initial=JUDGED_N, where=np.isfinite(push)))
+    values = np.hstack([plate.force[:, level] / most * STILL_M / STILL_N, plate.cop[:, level]])  # still alike
     names = [*(f"its F{'xyz'[k]}" for k in level), *(f"its centre of pressure along {'XYZ'[k]}" for k in level)]
     holds = [f"{what}{'xyz'[k]}" for what in "FP" for k in level]
-    return Channels(plate.name, push, values, tuple(names), tuple(holds), (False, False, True, True))
+    return Channels(plate.name, push, values, tuple(names), tuple(holds), (True,) * 4)  # a seat may push up alone
