@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -41,6 +42,14 @@ def definition() -> ModelDefinition:
 @pytest.fixture(scope="module")
 def initial(trial: SimulatedTrial, definition: ModelDefinition) -> CalibratedModel:
     return definition.calibrate(trial.recording)
+
+
+def test_the_loads_of_the_documentation_are_of_the_default_model() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "models.md").read_text(encoding="utf-8")
+    example = page.split("## Known loads")[1].split("```toml")[1].split("```")[0]
+    settings = Settings.of(tomllib.loads(example), "docs/models.md", needed=())
+    model = dynakin.load_model(settings.model, subject=SUBJECT).model
+    assert settings.loads and {load.segment for load in settings.loads} <= {segment.name for segment in model.segments}
 
 
 def test_a_load_adds_its_own_wrench_and_nothing_else(initial: CalibratedModel) -> None:

@@ -16,7 +16,7 @@ from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, REASONS, SHARED, 
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.ground_plate import saturated
 from dynakin.recordings.recording import Plate, Recording
-from support.made_steps import FOOT_MARKERS, LABORATORY, Made, MadePlate, Stance, lasting, steps, walk
+from support.made_steps import FOOT_MARKERS, LABORATORY, Made, MadePlate, Stance, lasting, sliding_in, steps, walk
 
 T = 400
 TIME = np.arange(T) / 100.0
@@ -326,3 +326,11 @@ def test_a_plate_beside_one_of_two_flat_feet_is_shared_and_its_place_doubted() -
     loads = foot_loads(wide, LABORATORY, MARKERS)
     assert (loads.reason == SHARED).all()
     assert any("b lies off its place" in message.text for message in loads.messages)
+
+
+def test_a_foot_that_slides_low_beside_the_plates_as_the_recording_ends_may_set_down() -> None:
+    feet = walk(3, 0.6)
+    made = sliding_in(steps(lasting(3), feet, [MadePlate(f"p{k}", edges=False) for k in range(3)]), feet, late_s=0.09)
+    part = made.recording.with_plates(made.recording.plates[:2]).window(0.0, feet["right"][1].start + 0.04)
+    said = [text for text in map(str, foot_loads(part, LABORATORY, FOOT_MARKERS).messages) if "off the plates" in text]
+    assert len(said) == 1 and "The right foot may set down off the plates" in said[0]

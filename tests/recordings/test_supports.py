@@ -72,6 +72,47 @@ def test_level_floor_and_stairs_up_and_down_give_every_stance_its_plate(rise: fl
     assert loads.total_known[made.recording.time > 0.5].all()
 
 
+@pytest.mark.parametrize("rise", [0.17, -0.19])
+@pytest.mark.parametrize("shown_s", [0.05, 0.11])
+def test_a_step_that_the_recording_cuts_off_has_its_plate(rise: float, shown_s: float) -> None:
+    """Up, the last 0.14 s of a stance were nobody's load at the end; down, at the start."""
+    feet = walk(6, 0.30, rise=rise)
+    made = steps(lasting(6), feet, plates_of(feet))
+    last, second = feet["left"][-1], feet["left"][0]
+    for start, end in ((0.0, last.start + shown_s), (second.end - shown_s, lasting(6))):
+        part = made.recording.window(start, end)
+        loads, at = foot_loads(part, LABORATORY, FOOT_MARKERS), round(start * RATE_HZ)
+        push = made.push[at : at + part.n_frames]
+        assert not [text for text in map(str, loads.messages) if "no foot stands" in text or "Both feet" in text]
+        assert (loads.reason[push > 60.0] == MEASURED).all()
+        known = np.isfinite(loads.wrench[..., 1])
+        assert np.abs(loads.wrench[..., 1] - push)[known].max() < 25.0
+
+
+def test_a_foot_that_only_sets_down_where_it_is_lowest_rests_flat_on_the_step_above() -> None:
+    """Down stairs, the recording ends with the heel 90 mm up: by it the step above lay 90 mm lower, on no plate's
+    level, and that plate was both feet's."""
+    feet = walk(4, 0.22, rise=-0.19)
+    last = feet["left"][-1]
+    made = steps(lasting(4), feet, plates_of(feet, (0.12, 0.25)))
+    markers, time = made.recording.markers.copy(), made.recording.time
+    markers[time > last.start - 0.3, made.recording.marker_names.index("LHEE"), 1] += 0.09
+    part = replace(made.recording, markers=markers).window(0.0, last.start + 0.12)
+    loads = foot_loads(part, LABORATORY, FOOT_MARKERS)
+    above = (part.time > feet["left"][0].start + 0.05) & (part.time < feet["left"][0].end - 0.05)
+    np.testing.assert_allclose(loads.soles.middle[above, 1, 1], -0.19, atol=0.01)
+    assert not (loads.reason == SHARED).any()
+
+
+def test_a_foot_that_stands_on_one_step_is_not_on_the_next_one_too() -> None:
+    """The last of a load on the step below presses at the edge, under the toes of the foot that went on."""
+    feet = walk(3, 0.22, rise=0.17)
+    feet = {side: [replace(s, z=z) for s in feet[side]] for side, z in (("right", 0.02), ("left", -0.02))}
+    made = steps(lasting(3), feet, plates_of(feet, (0.11, 0.25)))
+    part = made.recording.window(feet["right"][0].end - 0.03, lasting(3))
+    assert not foot_loads(part, LABORATORY, FOOT_MARKERS).on[:, 1, 0].any()
+
+
 @pytest.mark.parametrize("rise", [0.0, 0.17, -0.19])
 def test_without_plates_a_foot_that_is_loaded_may_bear_and_is_never_in_the_air(rise: float) -> None:
     feet = walk(6, 0.30, rise=rise)

@@ -167,7 +167,8 @@ class _Assignment:
 
     def under_feet(self) -> Flags:
         """(T, F, P) plates whose centre of pressure lies under a foot. One on another level than the foot's own support
-        counts only where no other foot stands on its level: a box may stand on a plate. Nobody stands below one."""
+        counts only where no foot stands on its level, and the foot on no plate of its own: a box may stand on a plate.
+        Nobody stands below one."""
         found = np.zeros_like(self.on)
         level = np.ones_like(self.on)
         for k, name in enumerate(self.feet):
@@ -178,7 +179,8 @@ class _Assignment:
                 if plate.height_m is not None:
                     over = foot.support_m - plate.height_m
                     level[:, k, p] = (over > -NEAR_SUPPORT_M) & (over < SAME_LEVEL_M)
-        return np.asarray(found & (level | ~(found & level).any(axis=1, keepdims=True)))
+        own = found & level
+        return np.asarray(found & (level | ~(own.any(axis=1, keepdims=True) | own.any(axis=2, keepdims=True))))
 
     def stances(self, k: int, foot: FootContact) -> None:
         """Which plates carry each stance of one foot."""

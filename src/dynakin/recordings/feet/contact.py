@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs, widened
 from dynakin.recordings.feet.belt import belt_velocities
-from dynakin.recordings.feet.places import filled_by_others, flat_heights, foot_places
+from dynakin.recordings.feet.places import filled_by_others, flat_heights, foot_places, lowest_together
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, SHOE_M, UNDER_MARKERS_M, GroundPlate, floor_height
@@ -128,6 +128,11 @@ def foot_contacts(
     seen = foot_places(recording, ground, markers)
     weighed = any(plate.loaded.any() for plate in plates)  # without them a foot may stand on a step all the time
     flats = flat_heights([places for _, places in seen.values()], NEAR_SUPPORT_M, ALOFT_M if weighed else np.inf)
+    rests = RESTS_S * recording.rate if recording.n_frames > 1 else np.inf
+    flats = [
+        lowest_together(places, velocity[:, columns], flat, NEAR_SUPPORT_M, LEVEL_M_S, rests)
+        for (columns, places), flat in zip(seen.values(), flats, strict=True)
+    ]
     with np.errstate(invalid="ignore"):
         low = [
             (velocity[:, columns], places[:, :, 1] - flat < NEAR_SUPPORT_M)
@@ -162,12 +167,15 @@ def pivots(places: Array, velocity: Array) -> Flags:
 
 
 def _settle(feet: list[_Foot]) -> None:
-    """Believe that feet rest on what is higher than the floor: where a plate carries one; then, the longest first,
-    where no other one stands for a while, or one stands that is on a level with it."""
-    for foot in feet:
-        others = [other for other in feet if other is not foot]
-        for rest in [one for one in foot.waiting if foot.carried(one[0], others)]:
-            foot.believe(rest)
+    """Believe that feet rest on what is higher than the floor: where a plate carries one, also if the recording cuts
+    that off; then, the longest first, where no other one stands for a while, or one stands that is on a level with
+    it."""
+    for cut_off in (False, True):
+        for foot in feet:
+            others = [other for other in feet if other is not foot]
+            rests = foot.cut_off if cut_off else foot.waiting
+            for rest in [one for one in rests if foot.carried(one, others, on_its_level=cut_off)]:
+                foot.believe(rest)
     while True:
         waiting = [(rest[0].stop - rest[0].start, k, rest) for k, foot in enumerate(feet) for rest in foot.waiting]
         for _, k, rest in sorted(waiting, key=lambda one: -one[0]):
@@ -224,14 +232,17 @@ class _Foot:
             self.touching, self.level = base, np.where(base.any(axis=1), 0.0, np.nan)
         else:
             self.waiting += [(slice(*run), 0.0) for run in runs(_closed(base.any(axis=1), self.frames(GAP_S)))]
-        self.waiting += self._higher()
+        higher = self._higher()
+        self.waiting += [rest for rest in higher if self._lasts(rest[0])]
+        self.cut_off = [rest for rest in higher if not self._lasts(rest[0])]
 
     @property
     def stands(self) -> Flags:
         return _closed(np.asarray(self.touching.any(axis=1)), self.frames(GAP_S), self.seen)
 
     def _higher(self) -> list[tuple[slice, float]]:
-        """Stretches in which the foot keeps a height over its lowest place, slow."""
+        """Stretches in which the foot keeps a height over its lowest place, slow; shorter ones (`RESTS_S`) only where
+        the recording cuts them off."""
         if len(self.lift) < 2:
             return []
         half = self.frames(0.05)
@@ -242,9 +253,12 @@ class _Foot:
             level = self.slow.any(axis=1) & (self.lift > NEAR_SUPPORT_M) & (climbs < LEVEL_M_S)
         found = []
         for first, end in runs(_closed(np.asarray(level), self.frames(GAP_S))):
-            if end - first >= RESTS_S * self.rate:
+            if self._lasts(slice(first, end)) or first == 0 or end == len(self.lift):
                 found.append((slice(first, end), float(np.nanpercentile(self.lift[first:end], 10.0))))
         return found
+
+    def _lasts(self, frames: slice) -> bool:
+        return bool(frames.stop - frames.start >= RESTS_S * self.rate)
 
     def believe(self, rest: tuple[slice, float]) -> None:
         """That it stands in these frames, so much higher than its lowest place."""
@@ -268,10 +282,13 @@ class _Foot:
         heights = [float(np.min(foot.flat)) + foot.level[rest[0]] for foot in others]
         return any(bool((np.abs(height - own) < SAME_LEVEL_M).any()) for height in heights)
 
-    def carried(self, frames: slice, others: Sequence[_Foot]) -> bool:
-        """Whether a plate is loaded under the foot for most of these frames, where no other foot that stands may bear
-        it alone: who stands on one leg holds the other foot beside it."""
+    def carried(self, rest: tuple[slice, float], others: Sequence[_Foot], *, on_its_level: bool) -> bool:
+        """Whether a plate, or one of that height, is loaded under the foot for most of these frames, where no other
+        foot that stands may bear it alone: who stands on one leg holds the other foot beside it."""
+        frames, lowest = rest[0], float(np.min(self.flat)) + rest[1]
         for p, plate in enumerate(self.plates):
+            if on_its_level and plate.height_m is not None and not self._on(lowest, plate.height_m):
+                continue
             own = self.near[p][frames] & plate.loaded[frames]
             for other in others:
                 own &= ~(other.stands & (other.away[p] < ALONE_M))[frames]
@@ -284,17 +301,18 @@ class _Foot:
         stands = self.stands
         stances = tuple(runs(stands))
         levels = [self._level(first, end) for first, end in stances]
+        base, heights = self._heights(stances, levels)
         with np.errstate(invalid="ignore"):
             over = self.rise - self._between(stances, levels)[:, None]
             high, fast = over > ALOFT_M, (self.speed > SLOW_M_S) & ~self.slow
-            least = np.minimum(over, self.rise)
+            least = np.minimum(np.minimum(over, self.rise), self._over_plates(base))
             low = np.asarray((least < ALOFT_M).any(axis=1))
             near = np.asarray(((least < NEAR_SUPPORT_M) & (self.speed < SETS_DOWN_M_S)).any(axis=1))
         unseen = ~np.isfinite(self.rise)
         moves = np.asarray(self.seen & (fast | unseen).all(axis=1))
         aloft = np.asarray(moves & (high | unseen).all(axis=1))
         under = np.stack(self.near, axis=1) if self.near else np.zeros((len(stands), 0), dtype=bool)
-        support = self._between(stances, self._heights(stances, levels))
+        support = self._between(stances, heights)
         return FootContact(
             self.outline, self.rise, self.seen, under, support, self.belt, self.touching, stands, stances, low, near,
             moves, aloft,
@@ -312,9 +330,20 @@ class _Foot:
         at = [edge for first, end in stances for edge in (first, end - 1)]
         return np.asarray(np.interp(np.arange(len(self.lift)), at, np.repeat(values, 2)))
 
-    def _heights(self, stances: Sequence[tuple[int, int]], levels: Sequence[float]) -> list[float]:
-        """Heights (m) of what each stance stands on: of the plate that carries it, or by its level over the others;
-        that of the lowest place alone, where there is no stance."""
+    def _over_plates(self, base_m: float) -> Array:
+        """(T, K) m, as `rise`, over a loaded plate that the foot is not below, where one is under it; inf elsewhere: of
+        one that has just set down on the next step no stance shows that. Its lowest place stands on ``base_m``."""
+        found = np.full_like(self.rise, np.inf)
+        for near, plate in zip(self.near, self.plates, strict=True):
+            if plate.height_m is not None:
+                over = self.rise - (plate.height_m - base_m)
+                here = (near & plate.loaded)[:, None] & (over > -NEAR_SUPPORT_M)
+                found = np.where(here, np.minimum(found, over), found)
+        return found
+
+    def _heights(self, stances: Sequence[tuple[int, int]], levels: Sequence[float]) -> tuple[float, list[float]]:
+        """Heights (m) of what its lowest place stands on, and of what each stance does: of the plate that carries it,
+        or by its level over the others; the former alone, where there is no stance."""
         least = float(np.min(self.flat))
         plates: list[float | None] = []
         for (first, end), level in zip(stances, levels, strict=True):
@@ -330,9 +359,9 @@ class _Foot:
         else:
             base = self.floor_m if self._on(least, self.floor_m) else least - UNDER_MARKERS_M
         if not stances:
-            return [base]
+            return base, [base]
         own = [base + level for level in levels]
-        return [
+        return base, [
             plate if plate is not None and abs(plate - height) < SAME_LEVEL_M else height
             for plate, height in zip(plates, own, strict=True)
         ]

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from dynakin.arrays import runs
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import find_marker
 from dynakin.recordings.recording import Array, Recording
@@ -44,6 +45,26 @@ def flat_heights(places: Sequence[Array], near_m: float, aloft_m: float) -> list
             flats[k] = flats[k] - over.min()
             break
     return flats
+
+
+def lowest_together(
+    points: Array, velocity: Array, flat: Array, near_m: float, still_m_s: float, frames: float
+) -> Array:
+    """Heights (K,) m of a foot's markers while it stands flat, of which ``flat`` says each one's lowest alone: no
+    posture of a foot that only sets down where it is lowest, its heel up. It has the one in which it rests elsewhere,
+    on the step above.
+
+    Args:
+        points: (T, K, 3) m. velocity: (T, K, 3) m/s. near_m: how far from its height a marker may be that is there.
+        still_m_s: speed of a marker that rests. frames: for how long it does.
+    """
+    with np.errstate(invalid="ignore"):
+        still = np.asarray((np.linalg.norm(velocity, axis=2) < still_m_s).all(axis=1))
+    rests = [points[first:end, :, 1] - flat for first, end in runs(still) if end - first >= frames]
+    if not rests or (np.abs(over := np.concatenate(rests)) < near_m).all(axis=1).any():
+        return flat
+    posture = np.median(over - over.mean(axis=1, keepdims=True), axis=0)
+    return np.asarray(flat + posture - posture.max()) if np.ptp(posture) > near_m else flat
 
 
 def _sways(points: Array) -> bool:

@@ -66,10 +66,10 @@ class WhoStandsWhere:
             return []
         time, found, out = self.time, list[Message](), "what it carries is estimated there."
         for k, foot in enumerate(self.feet):
-            found += [
-                note("plates", f"The {foot} foot stands off the plates from {span(time, a, b)}: {out}")
-                for a, b in runs(self.off[:, k])
-            ]
+            for a, b in runs(self.off[:, k]):
+                stands = self.contacts[foot].stands[a:b].any()
+                text = "stands off the plates" if stands else "may set down off the plates"
+                found.append(note("plates", f"The {foot} foot {text} from {span(time, a, b)}: {out}"))
             if self.hidden[:, k].any():
                 found.append(
                     note(
