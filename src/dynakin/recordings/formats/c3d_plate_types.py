@@ -23,11 +23,14 @@ from typing import Literal
 
 import numpy as np
 
+from dynakin.errors import RecordingError
+from dynakin.messages import Message, warning
 from dynakin.recordings.plates.dead import LEVER_M, Channels
 from dynakin.recordings.recording import Array
 
 Signal = Literal["force", "moment", "point"]
 _WRENCH: tuple[Signal, ...] = ("force",) * 3 + ("moment",) * 3
+_WITHIN_EDGES = 1.01  # corners are measured, distances of sensors a maker's
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,33 @@ TYPES: dict[int, PlateType] = {
     6: PlateType(_SENSORS, ("force",) * 12, calibrated=True, uncalibrated=6),
     7: PlateType(_KISTLER, ("force",) * 8, calibrated=True, uncalibrated=3),
 }
+
+
+def checked_origin(name: str, origin: Array, kind: int, corners: Array) -> tuple[Array, list[Message]]:
+    """A plate's origin (3,) m as the file gives it, and what there is to say of it. Of types 3, 6 and 7 it holds how
+    far its sensors lie from its axes, which is within its edges by the corners (4, 3) m.
+
+    Raises:
+        RecordingError: it cannot be that of this plate.
+    """
+    if not np.isfinite(origin).all():
+        raise RecordingError("FORCE_PLATFORM:ORIGIN holds no numbers for it")
+    if TYPES[kind].outputs.count("force") == 3:
+        return origin, []
+    sensors = np.abs(origin[:2])
+    edges = 0.5 * np.linalg.norm([corners[0] - corners[1], corners[0] - corners[3]], axis=1)
+    if not (sensors > 0.0).all():
+        raise RecordingError("FORCE_PLATFORM:ORIGIN has its sensors on its axes (a, b), where none lie")
+    if (sensors <= _WITHIN_EDGES * edges).all():
+        return origin, []
+    (a, b), (x, y) = 1000.0 * sensors, 1000.0 * edges
+    text = (
+        f"by FORCE_PLATFORM:ORIGIN its sensors lie {a:.0f} and {b:.0f} mm (a, b) from its middle, by the corners its "
+        f"edges {x:.0f} and {y:.0f} mm"
+    )
+    if (sensors[::-1] <= _WITHIN_EDGES * edges).all():
+        raise RecordingError(f"{text}: a and b have been exchanged. Exchange them, or correct the corners, in the file")
+    return origin, [warning("plates", f"{name}: {text}: sensors lie within. Correct what is wrong in the file.")]
 
 
 def plate_wrench(

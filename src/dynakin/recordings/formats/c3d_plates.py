@@ -18,7 +18,7 @@ from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, together, warning
 from dynakin.recordings.formats.c3d_channels import at_end_of_range, zero_frames, zeroed
 from dynakin.recordings.formats.c3d_parameters import Parameters
-from dynakin.recordings.formats.c3d_plate_types import TYPES, as_recorded, plate_wrench
+from dynakin.recordings.formats.c3d_plate_types import TYPES, as_recorded, checked_origin, plate_wrench
 from dynakin.recordings.formats.c3d_plate_units import (
     Strange,
     fitting_moments,
@@ -48,7 +48,6 @@ _MOST_PLATES = 100
 _LASTING_PULL, _LEAST_IDLE, _OFFSET_WORTH_A_NOTE_N = 0.02, 0.05, 5.0
 _LEAST_SURFACE_M2 = 1e-4
 _LOOK = "look at its cable and its amplifier, and at this channel in the file"
-_WITHIN_EDGES = 1.01  # corners are measured, distances of sensors a maker's
 
 
 @dataclass(frozen=True)
@@ -196,8 +195,11 @@ def _raw(
     measured, said = _bridged(name, analog[channels], analog.shape[1] // len(markers))
     notes += said
     units = units_of(parameters, channels, measured, unit_m, kind, calibration is not None)
-    origin, said = _origin(name, parameters, k, kind, corners, unit_m)
-    notes += said
+    origin = np.zeros(3)
+    if kind != 1:  # which needs none
+        given = _slice(parameters.array("FORCE_PLATFORM", "ORIGIN"), k, 3, "ORIGIN") * unit_m
+        origin, said = checked_origin(name, given, kind, corners)
+        notes += said
     signals = measured
     if (zero := zero_frames(parameters, len(markers))) is not None:
         as_it_is, _ = plate_wrench(kind, signals, origin=origin, calibration=calibration, units=units.factors)
@@ -305,34 +307,6 @@ def _slice(values: Array, k: int, size: int, key: str) -> Array:
     if len(flat) < size * (k + 1):
         raise RecordingError(f"FORCE_PLATFORM:{key} has {len(flat)} numbers, it needs {size * (k + 1)}")
     return flat[size * k : size * (k + 1)]
-
-
-def _origin(
-    name: str, parameters: Parameters, k: int, kind: int, corners: Array, unit_m: float
-) -> tuple[Array, list[Message]]:
-    """Of plate k, m, and what there is to say of it; type 1 needs none. Of types 3, 6 and 7 it holds how far its
-    sensors lie from its axes, which is within its edges by the corners (4, 3) m."""
-    if kind == 1:
-        return np.zeros(3), []
-    origin = _slice(parameters.array("FORCE_PLATFORM", "ORIGIN"), k, 3, "ORIGIN") * unit_m
-    if not np.isfinite(origin).all():
-        raise RecordingError("FORCE_PLATFORM:ORIGIN holds no numbers for it")
-    if TYPES[kind].outputs.count("force") == 3:
-        return origin, []
-    sensors = np.abs(origin[:2])
-    edges = 0.5 * np.linalg.norm([corners[0] - corners[1], corners[0] - corners[3]], axis=1)
-    if not (sensors > 0.0).all():
-        raise RecordingError("FORCE_PLATFORM:ORIGIN has its sensors on its axes (a, b), where none lie")
-    if (sensors <= _WITHIN_EDGES * edges).all():
-        return origin, []
-    (a, b), (x, y) = 1000.0 * sensors, 1000.0 * edges
-    text = (
-        f"by FORCE_PLATFORM:ORIGIN its sensors lie {a:.0f} and {b:.0f} mm (a, b) from its middle, by the corners its "
-        f"edges {x:.0f} and {y:.0f} mm"
-    )
-    if (sensors[::-1] <= _WITHIN_EDGES * edges).all():
-        raise RecordingError(f"{text}: a and b have been exchanged. Exchange them, or correct the corners, in the file")
-    return origin, [warning("plates", f"{name}: {text}: sensors lie within. Correct what is wrong in the file.")]
 
 
 def _calibration(parameters: Parameters, k: int, kind: int) -> Array | None:
