@@ -110,6 +110,15 @@ def test_a_dead_channel_is_named_and_its_plate_not_measured(
     assert np.isnan(found.plates[1].force[118:172]).all() and np.isfinite(found.plates[1].force[:100]).all()
 
 
+@pytest.mark.parametrize(("which", "name"), [(0, "Fx"), (1, "Fy"), (4, "My")])
+def test_a_dead_channel_of_the_only_plate_that_is_stepped_on_is_named(tmp_path: Path, which: int, name: str) -> None:
+    """Its own channel that is nowhere else is no sign of a movement in a plane, because who comes onto it moves all."""
+    walk = dead(walked(0.2, 1), which, 0.15 if name[0] == "M" else 0.5)
+    for beside in ((), (NOISE,)):
+        found = recorded(tmp_path / "a.c3d", 2, walk, *beside)
+        assert [said.text[:15] for said in warnings_of(found.notes)] == [f"plate 1: its {name}"]
+
+
 def test_a_dead_channel_of_who_squats_is_named(tmp_path: Path) -> None:
     found = recorded(tmp_path / "a.c3d", 2, dead(squatted(1), 4, 0.15), squatted(2))
     assert [said.text[:15] for said in warnings_of(found.notes)] == ["plate 1: its My"]

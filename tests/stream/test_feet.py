@@ -166,7 +166,7 @@ def test_smoothed_moments_and_bands_are_those_with_the_feet(
     model, x, P = live.tracker.core_model, live.tracker.state, live.tracker.covariance
     loads = live.tracker._steps.last.loads
     assert loads is not None
-    found = live.tracker.found_noise  # by whose factor all variances here are scaled
+    found = live.tracker.found_noise()  # by whose factor all variances here are scaled
     assert found.variance_scale < 0.5
     P = found.variance_scale * P
     with_feet = _core.contact_moments(model, x, loads, 0, np.asfortranarray(P))["moments_sd"]
@@ -190,7 +190,7 @@ def test_the_total_wrench_is_what_the_feet_give(squat: tuple[Live, list[LiveFram
     np.testing.assert_array_equal(wrench, given)
     late = tracker.systematic.sizes.clock * rate[:-1].sum(axis=0)
     sd = tracker.deviations()["wrench"].values
-    P = tracker.found_noise.variance_scale * tracker.covariance
+    P = tracker.found_noise().variance_scale * tracker.covariance
     own = _core.contact_moments(model, x, step.loads, 0, np.asfortranarray(P))["foot_wrench_sd"]
     np.testing.assert_allclose(sd, np.hypot(np.fmin(step.plates_sd, own[:-1].sum(axis=0)), late))
     assert (sd[:3] < 6.0).all() and (np.abs(late) > 0.0).all()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +22,6 @@ from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sight import hidden_segments
 from dynakin.filter.sources import ContactSources, with_sources
 from dynakin.filter.tracker import Tracker
-from dynakin.filter.uncertainty.locked import with_locked
 from dynakin.filter.uncertainty.low_pass import with_taken
 from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.messages import Message, note, warning
@@ -132,8 +130,6 @@ def assemble(
     events = events_of(whole, parameters, initial, limit_sd(used, used.unseen_sd))  # by what the filter itself believes
     if systematic is not None:
         data = systematic.added_over_time(data, late=bool(config.get("lag_s")))
-        data, said_of_locked = with_locked(data, initial, systematic, Path(config.get("model", "the model")).name)
-        notes = [*notes, *said_of_locked]
     if low_pass is not None:
         data, said = with_taken(data, low_pass, systematic)
         notes = [*notes, said]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -14,9 +13,6 @@ from dynakin.errors import ModelError
 from dynakin.filter.samples import in_step
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.times import step_of
-
-if TYPE_CHECKING:
-    pass
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]

@@ -22,6 +22,7 @@ from dynakin.filter.passes import passes
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.filter.tracker import Tracker
+from dynakin.filter.uncertainty.locked import with_locked
 from dynakin.filter.uncertainty.skin import skin_found
 from dynakin.filter.uncertainty.upright import hips_turned
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -298,7 +299,11 @@ class Estimator:
         estimate = assemble(
             arrays, tracker, recording, measured, config, notes, undeclared, systematic, found_low_pass(recording)
         )
-        return Tracked(without_lost(estimate), tracker)
+        estimate = without_lost(estimate)
+        if systematic is not None:
+            data, said = with_locked(estimate.data, calibrated, systematic, self.model.path.name)
+            estimate = replace(estimate, data=data, messages=[*estimate.messages, *said])
+        return Tracked(estimate, tracker)
 
     def measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array, Ground]:
         """What the filter takes of a recording: markers (T, M, 3) m, and wrench (T, 6), NaN where it is not known (all

@@ -76,7 +76,7 @@ class Tracker:
         self._time: float | None = None
         self._latest: StepEstimate | None = None
         self._steps = Steps(self.core_model, noise, lag)
-        self._found = FoundNoise(late=lag > 0) if noise.calibrates(bool(calibrated.feet)) else None
+        self._found = FoundNoise() if noise.calibrates(bool(calibrated.feet)) else None
 
     def fresh(self) -> Tracker:
         """Another one, at the start of the same model."""
@@ -114,11 +114,10 @@ class Tracker:
         wanted = self.noise.systematic_scale and self.calibrated.feet
         return Systematic(self.calibrated, self.noise) if wanted else None
 
-    @property
-    def found_noise(self) -> Noise:
+    def found_noise(self, *, delayed: bool = False) -> Noise:
         """The noise with the factor on its variances that innovations have shown until now (`FoundNoise`): deviations
-        go by it, the movement does not."""
-        shown = 1.0 if self._found is None else self._found.variance_scale
+        go by it, the movement does not. delayed: of those of `delayed`."""
+        shown = 1.0 if self._found is None else self._found.variance_scale(late=delayed)
         return self.noise.changed(variance_scale=shown * self.noise.variance_scale)
 
     @property
@@ -248,7 +247,9 @@ class Tracker:
         if late := delayed and self._with_lag().ready:
             lag = self._with_lag()
             step, state, covariance = self._delayed_step(lag), lag.state, lag.covariance
-        found = self._steps.deviations(step, (state, covariance), self.found_noise, self.systematic, late=late)
+        found = self._steps.deviations(
+            step, (state, covariance), self.found_noise(delayed=late), self.systematic, late=late
+        )
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
 
     def _with_lag(self) -> _core.FixedLag:

@@ -29,6 +29,11 @@ from dynakin.results.naming import sentence
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
+_CORRECT_MOMENTS = (
+    "Correct the signs or the order of the plates' channels, or of their corners, in this file; if something else "
+    "presses the plate, declare it (--contact)"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class GroundTrial:
@@ -57,12 +62,6 @@ class GroundTrial:
     def without_plates(self) -> GroundTrial:
         """The same of the markers alone."""
         return replace(self, recording=self.recording.with_plates(()), assigned=None)
-
-
-_CORRECT_MOMENTS = (
-    "Correct the signs or the order of the plates' channels, or of their corners, in this file; if something else "
-    "presses the plate, declare it (--contact)"
-)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from dynakin.results.records import FOLLOWING, TRACKING
 Array = npt.NDArray[np.float64]
 
 MOVES_M_S = 0.3
-"""Speed of markers (root of mean square) from which a frame counts in full: who stands shows the cameras alone."""
+"""Speed of markers (median) from which a frame counts in full: who stands shows the cameras alone."""
 FORGETS_S = 10.0
 """Of movement, after which a frame counts less by a factor of e."""
 DECLARED_S = 0.5
@@ -25,13 +25,9 @@ class FoundNoise:
     """The factor on all variances but the plates' with which innovations are of the expected size, over the frames in
     which somebody moves: for deviations what `adapt.calibrated_noise` finds in a recording. Such a factor leaves the
     movement as it is estimated, which is why it may change while a session goes on.
-
-    Args:
-        late: whether what is estimated waits for later frames.
     """
 
-    def __init__(self, *, late: bool) -> None:
-        self._share = 1.0 if late else LATE_SHARE
+    def __init__(self) -> None:
         self._seen: deque[tuple[float, Array]] = deque()  # from `MOVED_S` ago on
         self._begun_s: float | None = None
         self._squares = self._rows = self._moved_s = 0.0
@@ -54,16 +50,16 @@ class FoundNoise:
         self._moved_s = kept * self._moved_s + weight * dt
 
     def _speed(self) -> float:
-        """m/s, of the markers that were seen in both frames; 0 without any."""
+        """m/s, of the markers that were seen in both frames, whose median leaps leave alone; 0 without any."""
         (then_s, then), (now_s, now) = self._seen[0], self._seen[-1]
         way = np.square(now - then).sum(axis=1)
         way = way[np.isfinite(way)]
-        return float(np.sqrt(way.mean())) / (now_s - then_s) if len(way) else 0.0
+        return float(np.sqrt(np.median(way))) / (now_s - then_s) if len(way) else 0.0
 
-    @property
-    def variance_scale(self) -> float:
-        """1: as declared, which holds until somebody moves."""
+    def variance_scale(self, *, late: bool) -> float:
+        """1: as declared, which holds until somebody moves. late: of what is estimated with later frames."""
         if not self._squares:
             return 1.0
-        believed = self._share * self._moved_s / (self._moved_s + DECLARED_S)
+        share = 1.0 if late else LATE_SHARE
+        believed = share * self._moved_s / (self._moved_s + DECLARED_S)
         return float((self._squares / self._rows) ** believed)

@@ -43,7 +43,7 @@ class Steps:
     """Those of one filter, as far back as its lag, and the one before, by which loads change.
 
     Attributes:
-        last: before the first one the start, of which nothing is measured and everything is seen.
+        last: before the first one the start, as if all of it were seen and measured.
         off_plates: whether some foot has stood off the plates.
     """
 

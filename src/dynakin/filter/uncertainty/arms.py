@@ -75,6 +75,12 @@ class Arms:
             np.array([place for place, name in enumerate(free) if name in hips], dtype=np.intp),
         )
 
+    @property
+    def raised(self) -> dict[str, float]:
+        """As a limb of `mass_centres.unsure_moments`: what one of them has, because both together are seldom raised all
+        the way."""
+        return {self.trunk: self.mass_kg * self.reach_m}
+
     def variances(self, geometry: Geometry, motion: tuple[Array, Array, Array]) -> Array:
         """(C,) of moments by arms that swing as fast as thighs do, together and against each other.
 

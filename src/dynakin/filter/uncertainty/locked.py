@@ -79,7 +79,7 @@ def with_locked(
     there is to say of it: nothing where nothing is locked, or nothing moves more than skin does.
 
     Args:
-        data: as `Systematic.added_over_time` returns it. file: name of the model's file.
+        data: as of `without_lost`, with deviations as of `Systematic.added_over_time`. file: name of the model's file.
     """
     motion = motion_of_locked(data, initial, systematic)
     if motion is None:
@@ -104,7 +104,8 @@ def motion_of_locked(data: xr.Dataset, initial: CalibratedModel, systematic: Sys
     free = free_coordinates(model.spec)
     opened = np.array([spec.coordinates[k].locked for k in free])
     states = _states(model, spec, values_of(data, "state"), opened)
-    known = np.flatnonzero(np.isfinite(states).all(axis=1))
+    lost = np.asarray(data["lost"].values, dtype=bool)  # its state is what the filter held
+    known = np.flatnonzero(np.isfinite(states).all(axis=1) & ~lost)
     if len(known) < frames:
         return None
     K, L, at = len(free), len(names), np.arange(len(states))
@@ -245,7 +246,7 @@ def _in_words(
         if share[k] > MATTERS:
             off.append(f"{of}{words(str(data['coordinate'].values[k]))} by some {scale * now[k]:.1f} {unit}")
     text = (
-        f"{file} locks {listed(moving)}, but the markers on both sides of the joint move as if it turned by "
+        f"{file} locks {listed(moving)}, but the markers on both sides of the joint go as if it moved by "
         f"{listed(amounts)} (root mean square)"
     )
     if not off:

@@ -26,8 +26,9 @@ class MassCentres:
 
     def __init__(self, geometry: Geometry, calibrated: CalibratedModel) -> None:
         self._geometry = geometry
-        self._limbs = unsure_moments(unseen_limbs(calibrated), geometry.errors.massive)
         self._arms = Arms.of(calibrated)
+        limbs = unseen_limbs(calibrated) + ([self._arms.raised] if self._arms else [])
+        self._limbs = unsure_moments(limbs, geometry.errors.massive)
 
     def variances(self, frame: Frame) -> Parts:
         """Of moments, in one frame."""
@@ -46,9 +47,6 @@ def unseen_limbs(calibrated: CalibratedModel) -> list[dict[str, float]]:
     A limb has two segments or more, and hangs on a segment that is marked and is not the root: head and hands count as
     still, of what hangs on the root the joint's moment is absent.
     """
-    arms = Arms.of(calibrated)
-    if arms:
-        return [{arms.trunk: arms.mass_kg * arms.reach_m}] * 2
     spec = calibrated.spec
     tree = calibrated.tree
     marked = {marker.segment for marker in spec.markers}
@@ -80,6 +78,7 @@ def unsure_moments(limbs: Sequence[dict[str, float]], segments: Sequence[str]) -
     for k, limb in enumerate(limbs):
         for name, moment in limb.items():
             own = sources[segments.index(name)]
-            own[0, 0] = own[1, 1] = moment
+            own[0, 0] += moment
+            own[1, 1] += moment
             own[2, 2 + k] = APART * moment
     return sources.reshape(_AXES * len(segments), -1)

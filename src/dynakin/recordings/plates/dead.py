@@ -37,7 +37,7 @@ vertical), of simulated walks on Kistler plates, which judged, 0.0070. The noise
 BLOCK_S, BLOCKS, LIKE_NOISE = 0.05, 4, 5.0
 """Means over so long, where there are so many, that vary less than so many times as noise has them vary, by how samples
 scatter within them, are noise: it has 1. Live channels have 45 and more at 1000 Hz (36 presses of real recordings,
-people who stand still among them), 22 and more at 100 Hz (simulated walks), horizontal forces in tables 12 and more.
+people who stand still among them), 22 and more at 100 Hz (simulated walks).
 Walks of one simulated subject and real data chose; walks and squats of five others judged, each channel dead in turn,
 also rounded to 1 N: 720 of 720 found, no right one accused."""
 CLEARLY = 4.0
@@ -62,8 +62,8 @@ class Channels:
         names: of each, in words.
         holds: what each one holds, or a part of it: a force "Fx", what tells where along an axis it acts "Px", "Py" (a
             moment), or anything else.
-        places: which ones are centres of pressure. They are calculated, so that their noise is not their own, and
-            somebody may press at one place; along an axis none may move though there is a force along it.
+        noiseless: which ones are judged by standing still alone: what is calculated has no noise of its own (somebody
+            may press at one place), and what a table has was low-passed.
     """
 
     plate: str
@@ -71,7 +71,7 @@ class Channels:
     values: Array
     names: tuple[str, ...]
     holds: tuple[str, ...]
-    places: tuple[bool, ...]
+    noiseless: tuple[bool, ...]
 
     def presses(self, rate_hz: float) -> list[tuple[int, int, Levels]]:
         """First frame, end and how the channels (C,) are, for each press that can be judged."""
@@ -82,8 +82,8 @@ class Channels:
             if end - first < max(PRESS_S * rate_hz, 3.0) or change < CHANGES:
                 continue
             if np.isfinite(self.values[own]).all():
-                parts = self.values[own] * np.where(self.places, STILL_N / STILL_M, 1.0 / most)
-                level = np.where(self.places, CLEAR, _level(parts, change, rate_hz))
+                parts = self.values[own] * np.where(self.noiseless, STILL_N / STILL_M, 1.0 / most)
+                level = np.where(self.noiseless, CLEAR, _level(parts, change, rate_hz))
                 found.append((first, end, np.where(np.ptp(parts, axis=0) < STILL_N, STILL, level)))
         return found
 
@@ -106,7 +106,7 @@ def _level(parts: Array, change: float, rate_hz: float) -> Levels:
     means = blocks.mean(axis=1)
     noise, found = blocks.var(axis=1, ddof=1).mean(axis=0) / size, means.var(axis=0, ddof=1)
     level = np.where(found < LIKE_NOISE * noise, NOISE, np.where(found < CLEARLY * LIKE_NOISE * noise, FOLLOWS, CLEAR))
-    return np.where(means.std(axis=0) < LEAST, NOISE, level) if change > COMES else level
+    return np.where(means.std(axis=0) < LEAST, STILL, level) if change > COMES else level
 
 
 def dead_channels(
@@ -138,10 +138,12 @@ def _missing(judged: Sequence[tuple[Channels, Levels]], *, vertical: bool) -> se
         return all(len(level) and (level < least).all() for level in own)
 
     absent = {what for plate, _ in judged for what in plate.holds if nowhere(what, CLEAR)}
-    sensed = {what for plate, _ in judged for what, place in zip(plate.holds, plate.places, strict=True) if not place}
+    sensed = {what for plate, _ in judged for what, out in zip(plate.holds, plate.noiseless, strict=True) if not out}
 
     def explained(what: str) -> bool:
         others = {other[0] for other in absent if other != what and other[0] == what[0]}
+        if what[0] not in "FPT":  # a signal of no axis
+            return False
         if what[0] == "F":
             return vertical or bool(others) or f"P{what[1]}" in absent or not nowhere(what, NOISE)
         return what[0] != "P" or (not others and (what not in sensed or f"F{what[1]}" in absent))
