@@ -14,7 +14,7 @@ import pytest
 
 from dynakin.cli.app import main
 from dynakin.cli.check_rows import _time
-from dynakin.cli.prepared import changed
+from dynakin.cli.prepared import changed, short
 from dynakin.filter.prepared import Prepared
 from dynakin.messages import note, warning
 from dynakin.results.files.markers import write_trc
@@ -185,3 +185,10 @@ def test_how_long_a_run_takes_is_said_where_it_is_more_than_a_minute() -> None:
         "A run takes about 9 min (30000 frames), on a busy machine more."
     ]
     assert not _time(ready(1346, 47, (True, True, True))) and not _time(ready(30_000, 20, (True, True, False)))
+
+
+def test_only_a_list_at_the_end_of_a_sentence_is_cut() -> None:
+    names = ", ".join(f"M{k}" for k in range(12))
+    assert short(note("markers", f"Left out: {names}.")).text == "Left out: M0, M1, M2, M3, M4 and 7 more."
+    said = f"{names} left out: a and b have been exchanged. Exchange them, or correct the corners."
+    assert short(note("plates", said)).text == said

@@ -102,11 +102,12 @@ def in_a_row(messages: Iterable[Message]) -> str:
 
 
 def short(message: Message) -> Message:
-    """A sentence whose long list is cut."""
-    parts = message.text.rstrip(".").split(", ")
-    if len(parts) <= _LONGEST_LIST:
+    """A sentence that ends with a long list, which is cut."""
+    head, colon, tail = message.text.rstrip(".").rpartition(": ")
+    parts = tail.split(", ")
+    if len(parts) <= _LONGEST_LIST or ". " in tail:  # not in the middle of what is said
         return message
-    return replace(message, text=f"{', '.join(parts[:_KEPT])} and {len(parts) - _KEPT} more.")
+    return replace(message, text=f"{head}{colon}{', '.join(parts[:_KEPT])} and {len(parts) - _KEPT} more.")
 
 
 def _sides(ready: Prepared) -> str:
