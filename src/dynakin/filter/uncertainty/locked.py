@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
-from scipy.ndimage import uniform_filter1d
-from scipy.signal import savgol_filter
 
 from dynakin.arrays import rms
 from dynakin.bindings import _core
@@ -84,6 +82,8 @@ def with_locked(
     motion = motion_of_locked(data, initial, systematic)
     if motion is None:
         return data, []
+    from scipy.ndimage import uniform_filter1d
+
     window = 2 * _frames(data) - 1
     sizes = {b: np.sqrt(uniform_filter1d(m**2, window, axis=0, mode="nearest")) for b, m in motion.moved.items()}
     said = {block: values_of(data, f"{block}_sd") for block in BLOCKS}
@@ -108,6 +108,8 @@ def motion_of_locked(data: xr.Dataset, initial: CalibratedModel, systematic: Sys
     known = np.flatnonzero(np.isfinite(states).all(axis=1) & ~lost)
     if len(known) < frames:
         return None
+    from scipy.signal import savgol_filter  # a heavy library, for files that lock something
+
     K, L, at = len(free), len(names), np.arange(len(states))
     weight = 1.0 / np.repeat(np.maximum(initial.soft_tissue_m, _LEAST_SKIN_M), 3)
     markers = _markers(data)

@@ -63,6 +63,9 @@ def lowest_together(
     rests = [points[first:end, :, 1] - flat for first, end in runs(still) if end - first >= frames]
     if not rests or (np.abs(over := np.concatenate(rests)) < near_m).all(axis=1).any():
         return flat
+    over = over[(over > near_m).all(axis=1)]  # elsewhere: on its own level it may never be flat
+    if not len(over):
+        return flat
     posture = np.median(over - over.mean(axis=1, keepdims=True), axis=0)
     return np.asarray(flat + posture - posture.max()) if np.ptp(posture) > near_m else flat
 

@@ -40,7 +40,7 @@ def turned_moments(contacts: Sequence[FootContact | None], plates: Sequence[Grou
     every = list(pressed)
     for names in (every, *([name] for name in every if len(every) > 1)):
         chosen = [pressed[name] for name in names]
-        if sum(len(each.push) for each in chosen) < max(JUDGED_S * rate_hz, 1.0):
+        if not sum(len(each.push) for each in chosen) >= max(JUDGED_S * rate_hz, 1.0):  # one frame has no rate
             continue
         now = _away(chosen, np.eye(2))
         if not now > AWAY_M:
