@@ -6,6 +6,8 @@ import re
 
 import numpy as np
 
+from dynakin.messages import together
+
 _WORD, _PUNCTUATION = re.compile(r"[^\W\d_][a-z'’-]*"), ",.;:!?)"
 
 INERTIA_WORDS = {
@@ -65,7 +67,7 @@ def listed(items: list[str], limit: int = 6) -> str:
     """`a, b and c`; the rest of a long list only counted."""
     if len(items) > limit:
         return f"{', '.join(items[:limit])} and {len(items) - limit} more"
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+    return together(items)
 
 
 def plural(count: int, noun: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.arms import Arms
 from dynakin.filter.uncertainty.frames import _STEP_S, Frame, Frames, any_off_plates
-from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Parts
+from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Geometry, Parts
 from dynakin.filter.uncertainty.joint_errors import OF_ROOT, JointErrors
 from dynakin.filter.uncertainty.loads import HANDS
 from dynakin.filter.uncertainty.locked import with_locked
@@ -963,7 +964,8 @@ def test_arms_that_a_file_does_not_have_swing_at_the_joint_below_the_trunk() -> 
     still, walking = np.zeros(len(free)), np.zeros(len(free))
     walking[[free.index("hip_flexion_r"), free.index("hip_flexion_l")]] = 10.0, -10.0
     x = np.array(model.initial_state())
-    geometry: Any = SimpleNamespace(model=model, x0=x)
+    geometry: Any = SimpleNamespace(model=model, x0=x, count=len(names))
+    geometry.moments_by = partial(Geometry.moments_by, geometry)
     found = np.sqrt(arms.variances(geometry, (x[: len(free)], still, walking)))
     spine = [names.index(name) for name in ("lumbar_extension", "lumbar_bending", "lumbar_rotation")]
     legs = [k for k, name in enumerate(names) if name.startswith(("hip", "knee", "ankle"))]

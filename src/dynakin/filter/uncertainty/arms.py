@@ -87,18 +87,17 @@ class Arms:
         Args:
             motion: free coordinates, their speeds and accelerations (K,).
         """
-        model, (q, qd, qdd) = geometry.model, motion
+        q, qd, qdd = motion
         x = np.concatenate([q, geometry.x0[len(q) :]])
         turning = np.square(qdd[self.legs]).sum() + STRIDE_RAD_S**2 * np.square(qd[self.legs]).sum()
         size = SWING * self.mass_kg * self.reach_m * float(np.sqrt(0.5 * turning))  # of each of two
-        rotations, places = _core.segment_poses(model, x)
+        rotations, places = _core.segment_poses(geometry.model, x)
         force = size * rotations[self.k] @ self.forwards
         points = places[self.k] + self.shoulders_m @ rotations[self.k].T
         each = np.array([np.concatenate([force, np.cross(point, force)]) for point in points])
-        found = np.zeros(len(model.spec.coordinates))
+        found = np.zeros(geometry.count)
         for wrench in (each.sum(axis=0), each[0] - each[1]):
             load = np.zeros((len(rotations), 6))
-            still = _core.joint_moments(model, x, load)
             load[self.k] = wrench
-            found += np.square(_core.joint_moments(model, x, load) - still)[: len(found)]
+            found += np.square(geometry.moments_by(x, load))
         return found

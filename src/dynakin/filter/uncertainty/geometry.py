@@ -80,9 +80,7 @@ class Geometry:
         N = self._displacements(jacobian) - carried.reshape(self._D0.shape)
         weight = self._root_weight if used is None else np.where(np.repeat(used, 3), self._root_weight, 0.0)
         A = jacobian[:, self.errors.free] * weight[:, None]
-        normal = A.T @ A
-        normal.flat[:: len(normal) + 1] += _UNSEEN_SD**-2
-        return -cho_solve(cho_factor(normal), (A * weight[:, None]).T), N
+        return -cho_solve(normal_factor(A), (A * weight[:, None]).T), N
 
     def external(self, wrench: Array, segments: Sequence[str]) -> Array:
         """(S, 6) by segment of the model: wrenches (F, 6) of contacts on these."""
@@ -90,6 +88,11 @@ class Geometry:
         for name, values in zip(segments, wrench, strict=True):
             external[self._segments[name]] += values
         return external
+
+    def moments_by(self, x: Array, load: Array) -> Array:
+        """(C,): what loads (S, 6) on the segments add to the moments of a state (n,). Moments are linear in them."""
+        moments = _core.joint_moments(self.model, x, load) - _core.joint_moments(self.model, x, np.zeros_like(load))
+        return np.asarray(moments)
 
     def blocks(self, q: Array, qd: Array, qdd: Array, moments: Array) -> Blocks:
         """Of all coordinates, from those of the free ones (K,), and of moments (C,)."""
@@ -103,3 +106,12 @@ class Geometry:
         """Of errors that no marker shows."""
         still = np.zeros(len(self.free))
         return self.blocks(still, still, still, moments)
+
+
+def normal_factor(A: Array) -> tuple[Array, bool]:
+    """Cholesky factor, as `cho_factor`, of the normal equations of markers' weighted Jacobian A (3 M, K): coordinates
+    that no marker shows are 0 to `_UNSEEN_SD`."""
+    normal = A.T @ A
+    normal.flat[:: len(normal) + 1] += _UNSEEN_SD**-2
+    found: tuple[Array, bool] = cho_factor(normal)
+    return found

@@ -25,15 +25,14 @@ HANDS = ("hand_r", "hand_l")
 
 
 class Clock:
-    """Kind "clock": loads that act a second later than they did. Moments are linear in them."""
+    """Kind "clock": loads that act a second later than they did."""
 
     def __init__(self, geometry: Geometry) -> None:
         self._geometry = geometry
 
     def variances(self, frame: Frame) -> Parts:
         """Of moments, in one frame."""
-        model, load = self._geometry.model, frame.external_rate
-        moments = _core.joint_moments(model, frame.x, load) - _core.joint_moments(model, frame.x, np.zeros_like(load))
+        moments = self._geometry.moments_by(frame.x, frame.external_rate)
         return {"clock": self._geometry.of_moments(np.square(moments))}
 
 
@@ -51,15 +50,12 @@ class Hands:
         """Of moments, in one frame, by its weight, because who carries something moves it at much less than g. Each
         hand holds 1/sqrt(2) kg, by itself: L5/S1 then bears 1 kg as it does with all of it in both, and a shoulder more
         than half and less than all of it."""
-        model = self._geometry.model
-        turns, places = _core.segment_poses(model, frame.x)
-        nothing = np.zeros_like(frame.external)
+        turns, places = _core.segment_poses(self._geometry.model, frame.x)
         found = np.zeros(self._geometry.count)
         for k, centre in zip(self._at, self._centres, strict=True):
-            load, weight = nothing.copy(), np.array([0.0, -GRAVITY_M_S2, 0.0])
+            load, weight = np.zeros_like(frame.external), np.array([0.0, -GRAVITY_M_S2, 0.0])
             load[k] = np.concatenate([weight, np.cross(places[k] + turns[k] @ centre, weight)])
-            with_it, without = (_core.joint_moments(model, frame.x, each) for each in (load, nothing))
-            found += 0.5 * np.square(with_it - without)
+            found += 0.5 * np.square(self._geometry.moments_by(frame.x, load))
         return {"hands": self._geometry.of_moments(found)}
 
 

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve
 
 from dynakin.arrays import rms
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.frames import wrenches_of
-from dynakin.filter.uncertainty.geometry import BLOCKS
+from dynakin.filter.uncertainty.geometry import BLOCKS, normal_factor
 from dynakin.filter.uncertainty.systematic import Systematic
-from dynakin.filter.uncertainty.upright import floats
+from dynakin.filter.uncertainty.upright import axes_of_root
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
@@ -48,8 +48,6 @@ found, on average over so many frames, from where the file holds it: 2.7 to 3.8 
 (10 deg off in truth) and of a trunk (6 deg off), 0.3 of right ones (`truth3d`)."""
 WINDOW_S = 0.15
 """Over which motion is smoothed and its size is taken: a step of a walk takes half a second."""
-_UNSEEN_SD = 0.5
-"""Standard deviation, rad or m, of a coordinate before any marker is seen."""
 _LEAST_SKIN_M = 0.001
 
 
@@ -88,7 +86,8 @@ def with_locked(
     sizes = {b: np.sqrt(uniform_filter1d(m**2, window, axis=0, mode="nearest")) for b, m in motion.moved.items()}
     said = {block: values_of(data, f"{block}_sd") for block in BLOCKS}
     wider = {f"{b}_sd": (("time", "coordinate"), np.hypot(said[b], sizes[b])) for b in BLOCKS}
-    judged = ~np.isin(data["coordinate"].values, [*motion.names, *_of_root(initial.spec)])
+    of_root = [axis.coordinate for axis in axes_of_root(initial.spec)]
+    judged = ~np.isin(data["coordinate"].values, [*motion.names, *of_root])
     notes = [_in_words(data, motion, said, sizes, judged, file)] if motion.sizes.any() else []
     return data.assign(wider), notes + ([_offset_in_words(data, motion, file)] if motion.offsets.any() else [])
 
@@ -118,10 +117,10 @@ def motion_of_locked(data: xr.Dataset, initial: CalibratedModel, systematic: Sys
     gains = np.zeros((len(known), K - L, L))
     for k, frame in enumerate(known):
         J = _core.marker_jacobian(model, states[frame])[:, :K] * weight[:, None]
-        whole, others = _normal(J), J[:, ~opened]
+        whole, others = normal_factor(J), J[:, ~opened]
         angles[k] = cho_solve(whole, J.T @ (residual[k] * weight))[opened]
         unsure[k] = np.diag(cho_solve(whole, np.eye(K)))[opened]
-        gains[k] = cho_solve(_normal(others), others.T @ J[:, opened])
+        gains[k] = cho_solve(normal_factor(others), others.T @ J[:, opened])
     angles -= angles.mean(axis=0)
     sizes = rms(angles, axis=0)
     shown = np.square(sizes) > OF_SKIN**2 * unsure.mean(axis=0)
@@ -207,22 +206,11 @@ def _from_held(
     for own, x in zip(markers, as_filed, strict=True):
         for _ in range(2):  # postures lie farther apart than small angles
             J = _core.marker_jacobian(model, x)[:, :K] / sd_m
-            normal = _normal(J)
+            normal = normal_factor(J)
             x[:K] += cho_solve(normal, J.T @ np.nan_to_num(own - _core.marker_positions(model, x).ravel()) / sd_m)
         found.append(x[:K][opened])
         variances.append(np.diag(cho_solve(normal, np.eye(K)))[opened])
     return np.mean(found, axis=0) - states[0, :K][opened], np.sqrt(np.mean(variances, axis=0))
-
-
-def _normal(J: Array) -> tuple[Array, bool]:
-    normal = J.T @ J
-    normal.flat[:: len(normal) + 1] += _UNSEEN_SD**-2
-    found: tuple[Array, bool] = cho_factor(normal)
-    return found
-
-
-def _of_root(spec: _core.ModelSpec) -> list[str]:
-    return [axis.coordinate for segment in spec.segments if floats(segment) for axis in segment.axes]
 
 
 def _in_words(

@@ -19,6 +19,11 @@ def floats(segment: _core.SegmentSpec) -> bool:
     return bool(segment.parent == "ground" and len({axis.coordinate for axis in segment.axes}) == 6)
 
 
+def axes_of_root(spec: _core.ModelSpec) -> list[_core.AxisSpec]:
+    """Of the segments that float."""
+    return [axis for segment in spec.segments if floats(segment) for axis in segment.axes]
+
+
 def trunks_of(calibrated: CalibratedModel) -> set[str]:
     """Segments that hang on one that floats, and that no foot hangs on."""
     return _on_root(calibrated) - {*calibrated.tree.up(*calibrated.feet.values())}
@@ -55,8 +60,7 @@ def neutral(calibrated: CalibratedModel) -> Array:
     free = free_coordinates(spec)
     K = len(free)
     q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
-    axes = [axis for segment in spec.segments if floats(segment) for axis in segment.axes]
-    turns = {axis.coordinate for axis in axes if axis.kind == "rotation" and axis.direction[1]}
+    turns = {axis.coordinate for axis in axes_of_root(spec) if axis.kind == "rotation" and axis.direction[1]}
     above = calibrated.tree.below(*trunks_of(calibrated))
     for segment in spec.segments:
         if segment.name in above:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -37,12 +38,7 @@ class Parameters:
 
     def continued(self, group: str, name: str) -> npt.NDArray[np.float64]:
         """Values as numbers in one list, continued in NAME2, NAME3, ... as C3D does beyond 255 of them."""
-        parts = [self.array(group, name).ravel()]
-        for number in range(2, 100):
-            if not len(parts[-1]):
-                break
-            parts.append(self.array(group, f"{name}{number}").ravel())
-        return np.concatenate(parts)
+        return np.concatenate([np.empty(0), *(self.array(group, part).ravel() for part in self._parts(group, name))])
 
     def number(self, group: str, name: str) -> float | None:
         """First value as a number, None where there is none."""
@@ -51,13 +47,13 @@ class Parameters:
 
     def texts(self, group: str, name: str) -> list[str]:
         """Values as stripped texts, continued in NAME2, NAME3, ... as C3D does beyond 255 of them."""
-        texts: list[str] = []
-        for suffix in ("", *map(str, range(2, 100))):
-            value = self._groups.get(group, {}).get(name + suffix)
-            if value is None:
-                break
-            texts += [_printable(str(text)).strip() for text in np.ravel(np.asarray(value, dtype=object))]
-        return texts
+        values = (self._groups[group][part] for part in self._parts(group, name))
+        return [_printable(str(text)).strip() for each in values for text in np.ravel(np.asarray(each, dtype=object))]
+
+    def _parts(self, group: str, name: str) -> list[str]:
+        """NAME, NAME2, NAME3, ... up to the first that is not there."""
+        names = (name + suffix for suffix in ("", *map(str, range(2, 100))))
+        return list(takewhile(lambda part: self._groups.get(group, {}).get(part) is not None, names))
 
     def text(self, group: str, name: str) -> str:
         """First text, "" where there is none."""
