@@ -30,7 +30,7 @@ from scipy.optimize import minimize
 import dynakin
 from dynakin.filter.uncertainty.frames import Frames
 from dynakin.filter.uncertainty.geometry import BLOCKS, Parts
-from dynakin.filter.uncertainty.reported import Own, reported
+from dynakin.filter.uncertainty.reported import movement_intensity, reported
 from dynakin.filter.uncertainty.sizes import LANDMARKS, SCALED, Sizes, hips_unshown, usual_sizes
 from dynakin.filter.uncertainty.skin import skin_found
 from dynakin.filter.uncertainty.systematic import Systematic
@@ -62,16 +62,18 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class Run:
-    """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
-    error at size 1. Frames that have no truth or no value are NaN. ``skin``: as of `skin_found`. ``hips``: as of
-    `hips_unshown`."""
+    """One estimate against the truth: by block errors (T, C), frames with the filter's own deviations, and variances by
+    kind of error at size 1. Frames that have no truth or no value are NaN. ``intensity``, ``moved_m``: (T,) as
+    `reported` takes them. ``skin``: as of `skin_found`. ``hips``: as of `hips_unshown`."""
 
     case: str
     seed: int
     sizes: str
     names: tuple[str, ...]
     error: dict[str, Array]
-    own: Own
+    frames: Frames
+    intensity: Array
+    moved_m: Array
     parts: Parts
     skin: float
     hips: float
@@ -158,7 +160,9 @@ def against(
     systematic = Systematic(tracker.calibrated, tracker.noise, sizes)
     late = bool(tracked.estimate.config["lag_s"])
     frames = Frames.of(data, len(tracker.calibrated.feet), tracker.noise.variance_scale, late=late)
-    own, parts = systematic.own(frames), systematic.parts(frames)
+    parts, free = systematic.parts(frames), systematic.geometry.free
+    accelerations = values_of(data, "accelerations")[:, free]
+    intensity = movement_intensity(accelerations, frames.sd["accelerations"][:, free])
     all_names = [str(n) for n in data["coordinate"].values]
     chosen = [n for n in all_names if n in names and n not in tracked.estimate.held]
     mine, theirs = [all_names.index(n) for n in chosen], [names.index(n) for n in chosen]
@@ -177,13 +181,9 @@ def against(
         "none" if case in PLANAR else "scaled" if tracker.calibrated.plan is None else "landmarks",
         tuple(chosen),
         error,
-        replace(
-            own,
-            sd={block: own.sd[block][here] for block in blocks},
-            intensity=own.intensity[window],
-            moved_m=own.moved_m[window],
-            sources=own.sources[here],
-        ),
+        replace(frames, sd={block: frames.sd[block][here] for block in blocks}, sources=frames.sources[here]),
+        intensity[window],
+        systematic.moved_m(frames.states)[window],
         {kind: {block: part[block][here] for block in blocks} for kind, part in parts.items()},
         skin_found(tracker.calibrated, {name: data[name].values for name in ("state", "tracking")}),
         hips_unshown(hips_turned(tracker.calibrated, values_of(data, "state"))),
@@ -211,9 +211,10 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     """By group: share inside 95 %, deviation over error, error and deviation (RMS; rad, rad/s, N m); None: the filter's
     own deviations."""
     found = {}
-    said = run.own.sd
+    said = run.frames.sd
     if sizes is not None:
-        said = reported(run.own, replace(sizes, hips=run.hips).with_skin(run.skin), run.parts)
+        sizes = replace(sizes, hips=run.hips).with_skin(run.skin)
+        said = reported(run.frames, sizes, run.parts, run.intensity, run.moved_m)
     for title, block, places in groups_of(run):
         e, sd = run.error[block][:, places], said[block][:, places]
         if block == "coordinates":

@@ -12,9 +12,8 @@ from dynakin.bindings import _core
 from dynakin.filter.augment import variance_scales
 from dynakin.filter.noise import prior_factor
 from dynakin.filter.step import Codes, deviations_of
-from dynakin.filter.uncertainty.frames import Frames
+from dynakin.filter.uncertainty.frames import Frames, as_believed
 from dynakin.filter.uncertainty.geometry import BLOCKS
-from dynakin.filter.uncertainty.reported import as_believed
 from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.recordings.times import step_of
 from dynakin.results.measures.sources import ABSENT, MEASURED

@@ -13,10 +13,9 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.filter.contacts import stands_off_plates
 from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Geometry
-from dynakin.filter.uncertainty.reported import as_believed
 from dynakin.recordings.times import step_of
 from dynakin.results.estimate import values_of
-from dynakin.results.measures.sources import in_use, moment_sources, plates_refused
+from dynakin.results.measures.sources import DERIVED, MEASURED, in_use, moment_sources, plates_refused
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -156,6 +155,11 @@ def rates(wrench: Array, time: Array) -> Array:
     """By how much wrenches (T, ...) change, a second, from sample to sample (a load passes from foot to foot within
     one); 0 beside what is not known."""
     return np.nan_to_num(np.gradient(wrench, time, axis=0)) if len(time) > 1 else np.zeros_like(wrench)
+
+
+def as_believed(sources: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """Codes of moments of frames whose plates were refused, by which they are no surer than if these were believed."""
+    return np.where(sources == DERIVED, MEASURED, sources).astype(np.uint8)
 
 
 def any_off_plates(data: xr.Dataset, feet: int) -> bool:

@@ -3,14 +3,13 @@ systematic errors (`systematic`) of their sizes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.filter.uncertainty.frames import Frames
 from dynakin.filter.uncertainty.geometry import Blocks, Parts
 from dynakin.filter.uncertainty.sizes import CENTRES, KINDS, Sizes
-from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
+from dynakin.results.measures.sources import MEASURED, PRIOR
 
 Array = npt.NDArray[np.float64]
 
@@ -56,62 +55,36 @@ def beyond_vigorous(intensity: Array, vigorous: float, step_s: float) -> Array:
     return np.maximum(most / vigorous - 1.0, 0.0)
 
 
-def as_believed(sources: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """Codes of moments of frames whose plates were refused, by which they are no surer than if these were believed."""
-    return np.where(sources == DERIVED, MEASURED, sources).astype(np.uint8)
-
-
-@dataclass(frozen=True, eq=False)
-class Own:
-    """The filter's own deviations, and what says how much of their variance holds.
-
-    Attributes:
-        sd: block -> (..., C). variance_scale: of the noise of the filter.
-        intensity: (...,) as of `movement_intensity`. moved_m: (...,) as of `Systematic.moved_m`.
-        sources: (..., C) of the moments (`results.measures.sources`): the filter's own part of what rests on a prior
-            counts in full, because how a jerk is seen has no part in that.
-        late: whether later frames helped. off_plates: whether `Sizes.own_off_plates` counts. step_s: usual step from
-            frame to frame, s.
-    """
-
-    sd: Blocks
-    variance_scale: float
-    intensity: Array
-    moved_m: Array
-    sources: npt.NDArray[np.uint8]
-    late: bool
-    off_plates: bool = False
-    step_s: float = np.nan
-
-
-def reported(own: Own, sizes: Sizes, parts: Parts) -> Blocks:
-    """Standard deviations that are reported: block -> (..., C).
+def reported(frames: Frames, sizes: Sizes, parts: Parts, intensity: Array, moved_m: Array) -> Blocks:
+    """Standard deviations that are reported: block -> (T, C).
 
     Args:
-        parts: variances as of `Systematic.parts`.
+        frames: the filter's own part of moments that rest on a prior counts in full, because how a jerk is seen has no
+            part in that. parts: variances as of `Systematic.parts`.
+        intensity: (T,) as of `movement_intensity`. moved_m: (T,) as of `Systematic.moved_m`.
     """
-    apart = float(np.fmax(own.step_s, STILL_TO_S)) / STILL_TO_S
+    apart = float(np.fmax(frames.step_s, STILL_TO_S)) / STILL_TO_S
     by_sizes = {
         "speeds": (STILL, sizes.own_speeds),
         "moments": (min(STILL * apart**2, 1.0), sizes.own_moments),
     }
-    factors = OWN_LATE | by_sizes if own.late else OWN_AT_ONCE
-    farther = np.maximum(own.moved_m / sizes.placed, 1.0)[..., None]
+    factors = OWN_LATE | by_sizes if frames.late else OWN_AT_ONCE
+    farther = np.maximum(moved_m / sizes.placed, 1.0)[..., None]
     found = {}
-    for block, sd in own.sd.items():
+    for block, sd in frames.sd.items():
         still, moving = factors[block]
-        factor = still + moving * own.intensity[..., None]
-        if own.late and block == "moments":
-            factor = factor + VIGOROUS_GROWS * beyond_vigorous(own.intensity, sizes.vigorous, own.step_s)[..., None]
+        factor = still + moving * intensity[..., None]
+        if frames.late and block == "moments":
+            factor = factor + VIGOROUS_GROWS * beyond_vigorous(intensity, sizes.vigorous, frames.step_s)[..., None]
         if block == "moments":
-            measured = sizes.own_off_plates / own.variance_scale if own.late and own.off_plates else 0.0
-            least = np.select([own.sources == PRIOR, own.sources == MEASURED], [1.0, measured], 0.0)
+            measured = sizes.own_off_plates / frames.variance_scale if frames.late and frames.off_plates else 0.0
+            least = np.select([frames.sources == PRIOR, frames.sources == MEASURED], [1.0, measured], 0.0)
             factor = np.maximum(factor, least)
         variance = factor * np.square(sd)
         for kind in KINDS:
             size = getattr(sizes, kind) * (farther if kind in CENTRES else 1.0)
             variance = variance + size**2 * parts[kind][block]
         if sizes.inertia:  # the filter's own part has so much of it already
-            variance = variance + np.maximum(1.0 - factor * own.variance_scale, 0.0) * parts["inertia"][block]
+            variance = variance + np.maximum(1.0 - factor * frames.variance_scale, 0.0) * parts["inertia"][block]
         found[block] = np.sqrt(variance)
     return found

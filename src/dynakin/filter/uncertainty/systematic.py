@@ -20,7 +20,7 @@ from dynakin.filter.uncertainty.inertia import Inertia
 from dynakin.filter.uncertainty.joints import Joints
 from dynakin.filter.uncertainty.loads import Clock, Hands, late_by
 from dynakin.filter.uncertainty.mass_centres import MassCentres
-from dynakin.filter.uncertainty.reported import Own, movement_intensity, reported
+from dynakin.filter.uncertainty.reported import movement_intensity, reported
 from dynakin.filter.uncertainty.sizes import KINDS, Sizes, hips_unshown, usual_sizes
 from dynakin.filter.uncertainty.skin import Skin
 from dynakin.messages import Message, warning
@@ -109,24 +109,12 @@ class Systematic:
             found["clock"]["moments"][k] = self._clock.variances(frames.at(k, self.geometry))["clock"]["moments"]
         return found
 
-    def own(self, frames: Frames) -> Own:
-        """What `reported` takes of the frames themselves."""
-        K = len(self.geometry.free)
-        acceleration, sd = frames.states[:, 2 * K : 3 * K], frames.sd["accelerations"][:, self.geometry.free]
-        return Own(
-            sd=frames.sd,
-            variance_scale=frames.variance_scale,
-            intensity=movement_intensity(acceleration, sd),
-            moved_m=self.moved_m(frames.states),
-            sources=frames.sources,
-            late=frames.late,
-            off_plates=frames.off_plates,
-            step_s=frames.step_s,
-        )
-
     def added(self, frames: Frames) -> Blocks:
         """The filter's standard deviations with these errors: block -> (T, C)."""
-        return reported(self.own(frames), self.sizes, self.parts(frames))
+        K = len(self.geometry.free)
+        acceleration, sd = frames.states[:, 2 * K : 3 * K], frames.sd["accelerations"][:, self.geometry.free]
+        intensity, moved_m = movement_intensity(acceleration, sd), self.moved_m(frames.states)
+        return reported(frames, self.sizes, self.parts(frames), intensity, moved_m)
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``, and the plates' clock in

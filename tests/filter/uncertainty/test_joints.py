@@ -1,0 +1,264 @@
+"""Joints that lie elsewhere than the model has them: their effects against models that are really changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from dynakin.bindings import _core
+from dynakin.filter.uncertainty.frames import _STEP_S
+from dynakin.filter.uncertainty.geometry import BLOCKS
+from dynakin.filter.uncertainty.joint_errors import OF_ROOT, JointErrors
+from dynakin.filter.uncertainty.sizes import LANDMARKS, OF_JOINTS, SHOWS_HIPS_RAD
+from dynakin.filter.uncertainty.systematic import Systematic
+from dynakin.filter.uncertainty.upright import hips_turned, neutral, trunks_of
+from dynakin.model.spec import free_names
+from dynakin.settings.noise import Noise
+from support.made_in_space import measured
+from support.systematic_leg import (
+    CONTACT,
+    DECLARED,
+    QD,
+    QDD,
+    REFERENCE,
+    Q,
+    X,
+    Y,
+    Z,
+    calibrated,
+    changed,
+    parts_of,
+    spec,
+    systematic,
+    with_errors,
+    with_motion,
+)
+
+Array = npt.NDArray[np.float64]
+
+
+def found(wrong: _core.Model, q: Array) -> Array:
+    """The posture in which the wrong model fits the right one's markers best, with the filter's weights."""
+    places = _core.marker_positions(_core.Model(spec()), np.r_[q, np.zeros(20)])
+    sd = np.hypot(np.hypot(0.0007, 0.0), 0.5 * DECLARED)[:, None]
+
+    def misfit(x: Array) -> Array:
+        return np.r_[((_core.marker_positions(wrong, np.r_[x, np.zeros(20)]) - places) / sd).ravel(), (x - q) / 0.5]
+
+    return np.asarray(least_squares(misfit, q, xtol=1e-14, ftol=1e-14, gtol=1e-14).x)
+
+
+def effects(wrong: _core.Model) -> tuple[Array, Array, Array, Array]:
+    """Errors of angles, speeds, accelerations, moments of a wrong model."""
+    times = (-_STEP_S, 0.0, _STEP_S)
+    before, now, after = (
+        found(wrong, Q + h * QD + 0.5 * h * h * QDD) - (Q + h * QD + 0.5 * h * h * QDD) for h in times
+    )
+    speed, acceleration = (after - before) / (2.0 * _STEP_S), (after - 2.0 * now + before) / _STEP_S**2
+    external = np.zeros((3, 6))
+    external[2] = CONTACT
+    right = _core.joint_moments(_core.Model(spec()), np.r_[Q, QD, QDD], external)
+    moments = _core.joint_moments(wrong, np.r_[Q + now, QD + speed, QDD + acceleration], external) - right
+    return now, speed, acceleration, moments
+
+
+def rotation(vector: Array) -> Array:
+    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
+
+
+@pytest.mark.parametrize("kind", ["hinge_centre", "ball_centre", "ball_across", "hinge_axes"])
+def test_effects_of_a_joint_are_those_of_a_model_that_is_changed(kind: str) -> None:
+    external = np.zeros((3, 6))
+    external[2] = CONTACT
+    parts = parts_of(systematic(), Q, QD, QDD, external)[kind]
+    size = 1e-5
+    if kind != "hinge_axes":
+        joint, along = {
+            "hinge_centre": ("knee", (X, Y, Z)),
+            "ball_centre": ("hip", (X, Y)),
+            "ball_across": ("hip", (Z,)),
+        }[kind]
+        wrong = [changed(**{joint: size * e}) for e in along]
+    else:
+        wrong = [changed(turned=rotation(size * e)) for e in (X, Y, Z)]
+    each = [effects(model) for model in wrong]
+    for k, block in enumerate(("coordinates", "speeds", "accelerations", "moments")):
+        expected = np.sqrt(sum(np.square(values[k] / size) for values in each))
+        tolerance = 2e-3 * expected.max()
+        np.testing.assert_allclose(np.sqrt(parts[block]), expected, rtol=0.02, atol=tolerance, err_msg=block)
+
+
+def test_in_the_reference_posture_a_wrong_joint_changes_lever_arms_and_no_angle() -> None:
+    still = np.zeros(10)
+    external = np.zeros((3, 6))
+    external[2, 1] = 500.0
+    parts = parts_of(systematic(), REFERENCE, still, still, external)["hinge_centre"]
+    np.testing.assert_allclose(parts["coordinates"], 0.0, atol=1e-12)
+    np.testing.assert_allclose(parts["speeds"], 0.0, atol=1e-9)
+    # the knee's moment: 500 N up less the shank's weight, which stays with the foot, times the place forward
+    np.testing.assert_allclose(np.sqrt(parts["moments"][9]), 500.0, rtol=0.1)
+
+
+def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_of_the_knee() -> None:
+    still = np.zeros(10)
+    q = np.zeros(10)
+    q[5] = 0.3  # rotation
+    external = np.zeros((3, 6))
+    external[2, 1] = 500.0
+    parts = parts_of(systematic(), q, still, still, external)
+    R = rotation(0.3 * Y)
+    for kind, axes in (("root", (X, Y)), ("root_tilt", (Z,))):
+        expected = np.zeros(3)
+        for e in axes:
+            turned = Rotation.from_matrix(R @ rotation(1e-6 * e)).as_euler("ZXY") - np.array([0.0, 0.0, 0.3])
+            at_zero = np.array([e[2], e[0], e[1]]) * 1e-6
+            expected += ((turned - at_zero) / 1e-6) ** 2
+        np.testing.assert_allclose(np.sqrt(parts[kind]["coordinates"][3:6]), np.sqrt(expected), rtol=0.03, atol=2e-3)
+        assert np.sqrt(parts[kind]["moments"][9]) < 1.0
+
+
+def test_a_knee_that_rolls_otherwise_errs_as_one_that_is_changed() -> None:
+    """No angle errs where it is straight."""
+    person = calibrated()
+    person.spec = spec(roll=0.0)
+    person.spec.parameters = [_core.ParameterSpec("roll", 0.0, True)]
+    person.names, person.x0 = tuple(_core.Model(person.spec).layout.names), _core.Model(person.spec).initial_state()
+    external = np.zeros((3, 6))
+    external[2] = CONTACT
+    subject = Systematic(person, Noise())
+    parts = parts_of(subject, Q, QD, QDD, external)["roll"]
+    size = 1e-5
+    for values, block in zip(effects(_core.Model(spec(roll=size))), BLOCKS, strict=True):
+        expected = np.abs(values / size)
+        np.testing.assert_allclose(
+            np.sqrt(parts[block]), expected, rtol=0.02, atol=2e-3 * expected.max(), err_msg=block
+        )
+    still = np.zeros(10)
+    straight = parts_of(subject, REFERENCE, still, still, external)["roll"]
+    assert straight["coordinates"].max() < 1e-18
+
+
+def test_a_joint_of_which_a_rotation_is_held_is_the_joint_that_it_was() -> None:
+    model = spec()
+    coordinates = model.coordinates
+    coordinates[8].locked = True  # the hip's turn about the thigh
+    model.coordinates = coordinates
+    seen = [set(JointErrors.of(model, np.zeros(10), held).kinds) for held in ((), ("turn",))]
+    assert "pair_axes" in seen[0] and "pair_axes" not in seen[1]
+    assert {"ball_axes", "ball_centre"} <= seen[1] and not {"ball_axes", "ball_centre"} & seen[0]
+
+
+def test_a_pelvis_is_as_sure_whichever_way_the_person_faces() -> None:
+    """Its tilt and list are about axes of the laboratory: of who faces backwards both change sign, with their zero.
+    Its frame's own third axis is the one about which it is less sure."""
+    standing = measured()
+    heading = standing.names.index("pelvis_rotation")
+    said = []
+    for turn in (0.0, np.pi, 0.5 * np.pi):
+        x0 = standing.x0.copy()
+        x0[heading] += turn
+        found = Systematic(replace(standing, x0=x0), Noise())
+        q = found.geometry.reference + 0.05 * np.sin(np.arange(len(found.geometry.reference)))
+        still = np.zeros_like(q)
+        parts = parts_of(found, q, still, still)
+        places = [standing.names.index(name) for name in ("hip_flexion_r", "hip_adduction_r", "hip_rotation_r")]
+        said.append(np.concatenate([parts[kind]["coordinates"][places] for kind in OF_ROOT]))
+        assert all((parts[kind]["coordinates"] < 0.3).all() for kind in OF_ROOT)
+    np.testing.assert_allclose(said[1:], [said[0]] * 2, rtol=0.1, atol=1e-6)
+
+
+def test_arms_have_their_zero_where_they_hang() -> None:
+    """Palms lie a quarter turn and more from an angle of 0: a tilted axis of elbows was said to move the forearm all
+    of that way. Trunk and legs stand straight."""
+    person = measured()
+    names = list(person.names)
+    arms = [
+        k for k, name in enumerate(names) if name.endswith(("_r", "_l")) and name.startswith(("arm", "elbow", "pro"))
+    ]
+    x0 = person.x0.copy()
+    for name, angle in (("pro_sup", 2.0), ("elbow_flex", 0.6), ("arm_flex", 0.4), ("hip_flexion", 0.5)):
+        x0[[names.index(f"{name}_{side}") for side in "rl"]] = angle
+    x0[names.index("lumbar_extension")] = -0.2
+    person = replace(person, x0=x0)
+    upright = dict(zip([c.name for c in person.spec.coordinates], neutral(person), strict=True))
+    assert [upright[name] for name in ("pro_sup_r", "elbow_flex_l", "arm_flex_r")] == [2.0, 0.6, 0.4]
+    assert upright["hip_flexion_r"] == upright["lumbar_extension"] == 0.0
+    found = Systematic(person, Noise())
+    q = found.geometry.reference.copy()
+    still = np.zeros_like(q)
+    hanging = parts_of(found, q, still, still)
+    assert all(hanging[kind]["coordinates"][arms].max() < 1e-12 for kind in OF_JOINTS)
+    q[arms] += 0.2
+    moved = sum(LANDMARKS.pair_axes**2 * parts_of(found, q, still, still)["pair_axes"]["coordinates"][arms])
+    assert 0.0 < np.degrees(np.sqrt(moved)) < 3.0
+
+
+def test_the_spine_is_no_joint_of_one_centre() -> None:
+    """What hangs on the pelvis and bears no foot is less sure of its centre in the sagittal plane, by size and kind."""
+    person = measured()
+    assert trunks_of(person) == {"torso"}
+    found = Systematic(person, Noise())
+    q = found.geometry.reference.copy()
+    q[person.names.index("lumbar_bending")] += 0.3
+    still = np.zeros_like(q)
+    parts = parts_of(found, q, still, still)
+    bending = person.names.index("lumbar_bending")
+    spine, hips = (parts[kind]["coordinates"][bending] for kind in ("spine_centre", "ball_centre"))
+    assert spine > 10.0 * hips and LANDMARKS.spine_centre > 10.0 * LANDMARKS.ball_centre
+
+
+def test_hips_that_do_not_turn_stay_where_a_regression_has_them() -> None:
+    standing = measured()
+    subject, spec = Systematic(standing, Noise()), standing.spec
+    K = len(free_names(spec))
+    q, still = standing.x0[:K], np.zeros(K)
+    external = np.zeros((len(spec.segments), 6))
+    external[[s.name for s in spec.segments].index(standing.feet["right"])] = [0.0, 700.0, 0.0, 0.0, 0.0, 0.0]
+    names = [c.name for c in spec.coordinates]
+    flexion, knee, other = (names.index(n) for n in ("hip_flexion_r", "knee_angle_r", "hip_flexion_l"))
+    sd = np.sqrt(parts_of(subject, q, still, still, external)["hips"]["moments"])
+    assert sd[flexion] == pytest.approx(700.0 * standing.sd0[standing.names.index("length/hip_forward")], rel=0.15)
+    assert sd[knee] < 0.3 * sd[flexion] and sd[other] < 0.3 * sd[flexion]
+    turns = [0.0, SHOWS_HIPS_RAD, np.inf]
+    found = [subject.with_found(0.0, hips_turned=turned).sizes.hips for turned in turns]
+    np.testing.assert_allclose(found, [1.0, np.sqrt(0.5), 0.0])
+    moving = np.zeros((3, K))
+    moving[:, names.index("hip_flexion_r")] = [-0.1, 0.0, 0.1]  # both legs: rms of one alone over root 2
+    assert hips_turned(standing, moving) == pytest.approx(np.sqrt(0.02 / 3.0 / 2.0))
+    assert hips_turned(calibrated(), np.zeros((0, 10))) == np.inf
+    functional = replace(standing.provenance, hips="functional")
+    for other in (replace(standing, plan=None), replace(standing, provenance=functional)):  # no regression
+        assert not parts_of(Systematic(other, Noise()), q, still, still, external)["hips"]["moments"].any()
+
+
+def test_a_skeleton_whose_markers_lie_elsewhere_has_centres_of_joints_that_are_as_much_less_sure() -> None:
+    person = calibrated()
+    markers = person.spec.markers
+    for marker in markers:
+        marker.estimated = [True] * 3
+    person.spec.markers = markers
+    core = _core.Model(person.spec)
+    person.names, person.x0 = tuple(core.layout.names), core.initial_state()
+    x = person.x0
+    subject, moved = Systematic(person, Noise()), x.copy()
+    moved[-3 * len(person.spec.markers) + 1 :: 3] += 0.012
+    assert subject.moved_m(x) == 0.0
+    assert subject.moved_m(moved) == pytest.approx(0.012)
+    assert systematic().moved_m(x) == 0.0  # no marker is looked for
+    own = dict.fromkeys(BLOCKS, np.full(len(Q), 0.01)) | {"speeds": np.full(len(Q), 0.1)}
+    own |= {"accelerations": np.full(len(Q), 10.0)}
+    said = [
+        with_errors(subject, own | {"moments": np.ones(len(Q))}, state, np.eye(len(x)), late=True)
+        for state in (with_motion(x), with_motion(moved))
+    ]
+    assert (said[1]["moments"] >= said[0]["moments"]).all() and said[1]["moments"][-1] > 1.1 * said[0]["moments"][-1]
+    assert (
+        subject.misfit(x) == []
+        and "12 mm" in subject.misfit(moved)[0].text
+        and "4.0 times" in subject.misfit(moved)[0].text
+    )
