@@ -81,7 +81,7 @@ def test_the_table_is_kept_where_bodies_do_not_predict_better(
     candidates = {"table": Posterior(TABLE), "bodies": Posterior(BODIES)}
     monkeypatch.setattr(decision, "posteriors", lambda common, others: candidates)
     decided = decide(case.common, case.trials)
-    np.testing.assert_allclose(decided.ratios("bodies"), parts)
+    np.testing.assert_allclose(decided.ratios, parts)
     assert decided.use == expected
     begins = "The table is kept" if expected == "table" else "The identified segment inertia is used"
     assert decided.in_words()[-1].startswith(begins)

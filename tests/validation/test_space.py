@@ -7,6 +7,7 @@ import pytest
 
 import dynakin
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.measurements import Measurements
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.recording import Recording
@@ -15,7 +16,7 @@ from dynakin.simulation.trial import simulate
 from dynakin.studies.tuning.trial import prepare
 from dynakin.units import COMPONENTS
 from dynakin.validation.held_out import Blind, judge, measured_wrench
-from dynakin.validation.unseen import _Trial
+from dynakin.validation.yardsticks import Judged
 
 WRONG = 1e6
 
@@ -59,5 +60,5 @@ def test_frames_beside_the_plates_are_not_judged(walk: Recording, initial: Calib
     rows = judge(Blind(walk, initial, {"right where known": wrench}, ()), walk)
     assert {row.quantity for row in rows} == set(COMPONENTS)
     assert all(row.rms.mean == 0.0 for row in rows)
-    trial = _Trial(walk, initial, np.empty((walk.n_frames, 0, 3)), measured_wrench(walk, initial)[0])
-    assert set(trial.wrench_errors("", "right where known", wrench).values()) == {0.0}
+    measured = Measurements(walk.time, np.empty((walk.n_frames, 0, 3)), measured_wrench(walk, initial)[0])
+    assert set(Judged(initial, measured).wrench("", "right where known", wrench).values()) == {0.0}

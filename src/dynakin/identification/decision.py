@@ -47,19 +47,21 @@ class Decision:
     full_band: dict[Use, Array]
     components: tuple[str, ...] = ("fx", "fy", "mz")
 
-    def ratios(self, use: Use) -> Array:
-        """(folds,) RMS over the table's, mean over the components."""
-        return np.asarray((self.rms[use] / self.rms["table"]).mean(axis=1))
+    @property
+    def ratios(self) -> Array:
+        """(folds,) RMS with the identified inertia over that with the table's, mean over the components."""
+        return np.asarray((self.rms["bodies"] / self.rms["table"]).mean(axis=1))
 
-    def full_band_ratios(self, use: Use) -> Array:
+    @property
+    def full_band_ratios(self) -> Array:
         """(folds,) the same of predictions that are not low-passed."""
-        return np.asarray((self.full_band[use] / self.full_band["table"]).mean(axis=1))
+        return np.asarray((self.full_band["bodies"] / self.full_band["table"]).mean(axis=1))
 
     @property
     def full_band_use(self) -> Use:
         """The winner for predictions that are not low-passed: the table too where more noise of accelerations, which
         goes with inertia far out on the limbs, outweighs what the identified inertia explains."""
-        ratios = self.full_band_ratios("bodies")
+        ratios = self.full_band_ratios
         return self.use if ratios.mean() <= 1.0 and ratios.max() <= WORST else "table"
 
     def in_words(self) -> list[str]:
@@ -75,13 +77,13 @@ class Decision:
                 for name, value in zip(self.components, values, strict=True)
             ]
             said.append(f"{use.capitalize()}: {', '.join(each)}.")
-        gain = 100.0 * (1.0 - self.ratios("bodies").mean())
-        worst = 100.0 * (self.ratios("bodies").max() - 1.0)
+        gain = 100.0 * (1.0 - self.ratios.mean())
+        worst = 100.0 * (self.ratios.max() - 1.0)
         verdict = (
             f"held-out gain {gain:z.0f} % of the wrench without plates (mean over components and parts; at the worst "
             f"part {-worst:+z.0f} %)"
         )
-        said.append(f"Not low-passed, the gain is {100.0 * (1.0 - self.full_band_ratios('bodies').mean()):z.0f} %.")
+        said.append(f"Not low-passed, the gain is {100.0 * (1.0 - self.full_band_ratios.mean()):z.0f} %.")
         if self.use == "table":
             return [
                 *said,
@@ -159,5 +161,5 @@ def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress |
     )
     components = tuple(COMPONENTS[k] for k in common.rows)
     decided = Decision("bodies", tuple(names), rms, unfiltered, components)
-    ratios = decided.ratios("bodies")
+    ratios = decided.ratios
     return decided if ratios.mean() <= GAIN and ratios.max() <= WORST else replace(decided, use="table")

@@ -19,7 +19,7 @@ from dynakin.errors import ModelError
 from dynakin.files import LARGEST_TEXT, read_bytes, write_text
 from dynakin.messages import note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.inertia import INERTIA_NAMES
+from dynakin.model.inertia import inertia_from
 from dynakin.model.state_priors import JointPrior
 from dynakin.results.naming import listed, plural, words
 from dynakin.settings.strict import Strict, read_toml, validate
@@ -253,14 +253,9 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
             lower[k] = min(lower[k], x0[k] - _WIDE * sd0[k])
             upper[k] = max(upper[k], x0[k] + _WIDE * sd0[k])
     spec = _core.Model(initial.spec).spec  # a copy; what is not estimated is held there
-    segments = spec.segments
+    segments, identified = spec.segments, dict(zip(subject.batch.names, values, strict=True))
     for segment in segments:
-        segment.inertia = np.array(
-            [
-                known.get(f"inertia/{segment.name}/{name}", (float(value),))[0]
-                for name, value in zip(INERTIA_NAMES, segment.inertia, strict=True)
-            ]
-        )
+        segment.inertia = inertia_from(identified, segment.name, segment.inertia)
     spec.segments = segments
     found = JointPrior(subject.batch.names, covariance)
     gain = "" if subject.held_out is None else f"; {subject.held_out.in_words()}"

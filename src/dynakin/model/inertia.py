@@ -8,6 +8,7 @@ and ``+``).
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,12 @@ Array = npt.NDArray[np.float64]
 INERTIA_NAMES = ("mass", "mx", "my", "mz", "ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 PLANAR_INERTIA = frozenset({"mass", "mx", "my", "izz"})
 """The four numbers that a motion in the sagittal plane depends on."""
+
+
+def inertia_from(values: Mapping[str, float], owner: str, otherwise: Sequence[float] | Array) -> Array:
+    """The ten numbers (10,) of a segment, SI, by their names in the state; those that ``values`` lacks as otherwise."""
+    named = zip(INERTIA_NAMES, otherwise, strict=True)
+    return np.array([values.get(f"inertia/{owner}/{name}", float(number)) for name, number in named])
 
 
 def _shift(vector: Array) -> Array:

@@ -56,10 +56,10 @@ _TAG = re.compile(r"<[^>]*>")
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 
 
-def new_axes(width_in: float = 3.6, height_in: float = 2.0) -> tuple[Figure, Axes]:
+def new_axes() -> tuple[Figure, Axes]:
     """A figure with one set of axes in the report's style, which makes room for its labels."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        figure = Figure(figsize=(4.3, 4.6), layout="constrained")
         figure.patch.set_alpha(0.0)
         axes = figure.add_subplot()
         axes.patch.set_alpha(0.0)

@@ -60,10 +60,7 @@ def angle_differences(trials: Sequence[ComparedTrial]) -> list[AngleDifference]:
                 w = trial.window
                 error = truth_error(scale * reference.coordinates[w, k], scale * method.known_coordinates()[w, k])
                 found.setdefault((name, "deg" if turn else "mm", method.name, reference.name), []).append(error)
-    return [
-        AngleDifference(*key, *(spread([error[k] for error in errors]) for k in range(len(TruthError._fields))))
-        for key, errors in found.items()
-    ]
+    return [AngleDifference(*key, *map(spread, zip(*errors, strict=True))) for key, errors in found.items()]
 
 
 def moment_differences(trials: Sequence[ComparedTrial]) -> list[MomentDifference]:
@@ -79,10 +76,7 @@ def moment_differences(trials: Sequence[ComparedTrial]) -> list[MomentDifference
                 fit = signal_fit(reference.moments[w, k], method.measured_moments()[w, k])
                 unit = "N m" if trial.rotation[k] else "N"
                 found.setdefault((name, unit, method.name, reference.name), []).append(fit)
-    return [
-        MomentDifference(*key, *(spread([fit[k] for fit in fits]) for k in range(len(SignalFit._fields))))
-        for key, fits in found.items()
-    ]
+    return [MomentDifference(*key, *map(spread, zip(*fits, strict=True))) for key, fits in found.items()]
 
 
 def _pairs(trial: ComparedTrial, kind: str) -> list[tuple[Method, Method]]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
 
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.inertia import INERTIA_NAMES
+from dynakin.model.inertia import INERTIA_NAMES, inertia_from
 from dynakin.results.estimate import Estimate
 
 
@@ -35,19 +36,17 @@ def freeze(initial: CalibratedModel, values: Mapping[str, float], start: Mapping
             as in ``initial``.
         start: coordinates to begin with, rad or m.
     """
-    spec = initial.spec
-    parameters = [
-        _core.ParameterSpec(entry.name, values.get(f"length/{entry.name}", entry.value), False)
-        for entry in spec.parameters
-    ]
-    segments = [_fixed_inertia(segment, values) for segment in spec.segments]
-    coordinates = [
-        _core.CoordinateSpec(c.name, c.value if c.locked else start.get(c.name, c.value), c.locked)
-        for c in spec.coordinates
-    ]
-    frozen = _core.ModelSpec(
-        spec.name, coordinates, parameters, segments, spec.markers, spec.gravity, spec.wrench_measured
-    )
+    frozen = copy(initial.spec)
+    coordinates, parameters, segments = frozen.coordinates, frozen.parameters, frozen.segments
+    for coordinate in coordinates:
+        if not coordinate.locked:
+            coordinate.value = start.get(coordinate.name, coordinate.value)
+    for parameter in parameters:
+        parameter.value, parameter.estimated = values.get(f"length/{parameter.name}", parameter.value), False
+    for segment in segments:
+        segment.inertia = inertia_from(values, segment.name, segment.inertia)
+        segment.inertia_estimated = [False] * len(INERTIA_NAMES)
+    frozen.coordinates, frozen.parameters, frozen.segments = coordinates, parameters, segments
     names = tuple(_core.Model(frozen).layout.names)
     kept = np.array([initial.names.index(name) for name in names])
     lower, upper = initial.lower[kept], initial.upper[kept]
@@ -63,21 +62,4 @@ def freeze(initial: CalibratedModel, values: Mapping[str, float], start: Mapping
         lower=lower,
         upper=upper,
         table=initial.table[kept],
-    )
-
-
-def _fixed_inertia(segment: _core.SegmentSpec, values: Mapping[str, float]) -> _core.SegmentSpec:
-    inertia = [
-        values.get(f"inertia/{segment.name}/{name}", float(number))
-        for name, number in zip(INERTIA_NAMES, segment.inertia, strict=True)
-    ]
-    return _core.SegmentSpec(
-        segment.name,
-        segment.parent,
-        segment.rotation,
-        segment.translation,
-        segment.lengths,
-        segment.axes,
-        np.array(inertia),
-        [False] * len(INERTIA_NAMES),
     )

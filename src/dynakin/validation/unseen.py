@@ -15,10 +15,8 @@ from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.core_filter import filter_settings
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.measurements import Measurements
-from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
-from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.settings.defaults import HORIZON_S
 from dynakin.units import COMPONENTS
@@ -32,11 +30,10 @@ from dynakin.validation.yardsticks import (
     PERSISTENCE,
     WITHHELD,
     Figures,
+    Judged,
     ahead,
-    extrapolated,
     held,
     line,
-    persisted,
     span_frames,
     with_mean,
 )
@@ -112,11 +109,17 @@ def unseen_figures(
     if setup.definition.floating:
         return figures_in_space(recording, setup, static=static, horizon_s=horizon_s, progress=progress)
     figures = plates_withheld(recording, setup, static=static)
+    time = recording.time
+    if evaluation_window(time)[0]:
+        raise RecordingError(
+            f"{recording.path or recording.name}: {time[-1] - time[0]:.1f} s, too short to leave a marker out after "
+            "the adaptation; expected more than 4 s"
+        )
     for preset in setup.noise:
         estimator = setup.estimator(preset)
         initial = estimator.start(recording, static=static).calibrated
         markers, wrench, _ = estimator.measured(recording, initial)
-        trial = _Trial(recording, initial, markers, wrench)
+        trial = Judged(initial, Measurements(time, markers, wrench))
         figures |= _left_out(estimator, preset, trial, progress)
         figures |= _ahead(estimator, preset, trial, horizon_s)
     return figures
@@ -137,80 +140,44 @@ def plates_withheld(recording: Recording, setup: Setup, *, static: Recording | N
     return {(WITHHELD, row.quantity, row.method): row.rms.mean for row in rows}
 
 
-@dataclass(frozen=True, eq=False)
-class _Trial:
-    recording: Recording
-    initial: CalibratedModel
-    markers: Array  # (T, M, 3) m, ground frame
-    wrench: Array  # (T, 6); NaN where the plates do not measure all of it: neither fed nor judged
-
-    def marker_errors(self, yardstick: str, method: str, estimated: Array, columns: Sequence[int]) -> Figures:
-        """RMS distance (mm) of some markers (T, M, 3), over the window."""
-        axes, window = np.array(self.initial.spec.markers[0].measured), evaluation_window(self.recording.time)
-        return {
-            (yardstick, self.initial.recorded_markers[k], method): marker_rms_mm(
-                self.markers[window, k], estimated[window, k], axes
-            )
-            for k in columns
-        }
-
-    def wrench_errors(self, yardstick: str, method: str, estimated: Array) -> Figures:
-        """RMS (N, N m) of each modelled component, over the window."""
-        window = evaluation_window(self.recording.time)
-        return {
-            (yardstick, COMPONENTS[k], method): signal_fit(self.wrench[window, k], estimated[window, k]).rms
-            for k in np.flatnonzero(self.initial.spec.wrench_measured)
-            if np.isfinite(self.wrench[window, k]).any()
-        }
-
-
-def _left_out(estimator: Estimator, preset: str, trial: _Trial, progress: Progress | None) -> Figures:
-    time = trial.recording.time
-    window = evaluation_window(time)
-    first = int(np.flatnonzero(window)[0])
-    if first == 0:
-        raise RecordingError(
-            f"{trial.recording.path or trial.recording.name}: {time[-1] - time[0]:.1f} s, too short to leave a marker "
-            "out after the adaptation; expected more than 4 s"
-        )
+def _left_out(estimator: Estimator, preset: str, trial: Judged, progress: Progress | None) -> Figures:
+    time, markers, *_ = trial.measured
+    first = int(np.flatnonzero(trial.window)[0])
     single: Figures = {}
-    count = trial.markers.shape[1]
+    count = markers.shape[1]
     for k in range(count):
-        hidden = trial.markers.copy()
+        hidden = markers.copy()
         hidden[first:, k] = np.nan
-        arrays = estimator.start(trial.initial).run_arrays(Measurements(time, hidden, trial.wrench))
-        single |= trial.marker_errors(LEFT_OUT, f"EKF ({preset})", arrays["markers_estimated"], [k])
+        arrays = estimator.start(trial.calibrated).run_arrays(trial.measured._replace(markers=hidden))
+        single |= trial.markers(LEFT_OUT, f"EKF ({preset})", arrays["markers_estimated"], [k])
         if progress is not None:
             progress(k + 1, count)
     for method, guess in (
-        (PERSISTENCE, [held(trial.markers[:, k], first - 1) for k in range(count)]),
-        (LINEAR, [line(time, trial.markers[:, k], first - 1) for k in range(count)]),
+        (PERSISTENCE, [held(markers[:, k], first - 1) for k in range(count)]),
+        (LINEAR, [line(time, markers[:, k], first - 1) for k in range(count)]),
     ):
-        single |= trial.marker_errors(LEFT_OUT, method, np.stack(guess, axis=1), range(count))
+        single |= trial.markers(LEFT_OUT, method, np.stack(guess, axis=1), range(count))
     return with_mean(LEFT_OUT, single)
 
 
-def _ahead(estimator: Estimator, preset: str, trial: _Trial, horizon_s: float) -> Figures:
-    time, initial = trial.recording.time, trial.initial
+def _ahead(estimator: Estimator, preset: str, trial: Judged, horizon_s: float) -> Figures:
+    time, initial = trial.measured.time, trial.calibrated
     yardstick = ahead(horizon_s)
     frames = span_frames(time, horizon_s)
-    states = estimator.start(initial).run_arrays(Measurements(time, trial.markers, trial.wrench))["state"]
+    states = estimator.start(initial).run_arrays(trial.measured)["state"]
     model = _core.Model(initial.spec)
     settings = filter_settings(initial, estimator.noise, model.layout, estimator.estimate)
     covariance = np.diag(initial.sd0**2)  # the mean's prediction does not depend on it
     probe = _core.Filter(model, settings, initial.x0, covariance)
-    markers, wrench = np.full_like(trial.markers, np.nan), np.full_like(trial.wrench, np.nan)
+    markers, wrench = (np.full_like(values, np.nan) for values in (trial.measured.markers, trial.measured.wrench))
     for k in range(len(time) - frames):
         probe.reset(states[k], covariance)
         probe.predict(float(time[k + frames] - time[k]))
         markers[k + frames] = _core.marker_positions(model, probe.state)
         wrench[k + frames] = _core.wrench(model, probe.state)
     figures: Figures = {}
-    for method, places, forces in (
-        (f"EKF ({preset})", markers, wrench),
-        (PERSISTENCE, persisted(trial.markers, frames), persisted(trial.wrench, frames)),
-        (LINEAR, extrapolated(time, trial.markers, frames), extrapolated(time, trial.wrench, frames)),
-    ):
-        figures |= trial.marker_errors(yardstick, method, places, range(markers.shape[1]))
-        figures |= trial.wrench_errors(yardstick, method, forces)
+    guesses = {f"EKF ({preset})": (markers, wrench)} | trial.raw_ahead(frames)
+    for method, (places, forces) in guesses.items():
+        figures |= trial.markers(yardstick, method, places, range(markers.shape[1]))
+        figures |= trial.wrench(yardstick, method, forces)
     return with_mean(yardstick, figures)

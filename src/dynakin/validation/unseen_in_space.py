@@ -3,7 +3,6 @@ filter and by inverse kinematics and dynamics on the same calibrated model."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,9 +19,7 @@ from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import evaluation_window
-from dynakin.units import COMPONENTS
 from dynakin.validation.case import Setup
 from dynakin.validation.reference.inverse_dynamics import (
     RigidMotion,
@@ -37,8 +34,8 @@ from dynakin.validation.yardsticks import (
     PERSISTENCE,
     WITHHELD,
     Figures,
+    Judged,
     ahead,
-    extrapolated,
     persisted,
     span_frames,
     with_mean,
@@ -76,7 +73,8 @@ def figures_in_space(
     """
     estimators = {f"EKF ({preset})": setup.estimator(preset) for preset in setup.noise}
     ready = {name: each.prepare(recording, static=static, lag_s=setup.lag_s) for name, each in estimators.items()}
-    trial = _Judged(next(iter(ready.values())))
+    trial = _judged(next(iter(ready.values())))
+    time, markers, *_ = trial.measured
     groups = left_out_groups(trial.calibrated)
     total, done = len(ready) * (len(groups) + 2), 0
 
@@ -86,32 +84,29 @@ def figures_in_space(
         if progress is not None:
             progress(done, total)
 
-    cutoffs = usual_cutoffs(setup.cutoff_hz, trial.time)
+    cutoffs = usual_cutoffs(setup.cutoff_hz, time)
     left_out: Figures = {}
     for group in groups:
-        hidden = trial.ready.measured.markers.copy()
+        hidden = markers.copy()
         hidden[:, group] = np.nan
         for name, each in ready.items():
             estimate = estimators[name].follow(replace(each, measured=each.measured._replace(markers=hidden))).estimate
             left_out |= trial.markers(LEFT_OUT, name, _of(estimate, "markers_estimated", trial.window), group)
             stepped()
-        for cutoff, motion in rigid_motions(trial.calibrated, trial.time, hidden, cutoffs).items():
+        for cutoff, motion in rigid_motions(trial.calibrated, time, hidden, cutoffs).items():
             left_out |= trial.markers(LEFT_OUT, inverse_name(cutoff), motion.markers(), group)
     withheld: Figures = {}
     ahead_of: dict[str, tuple[Array, Array]] = {}
     for name, each in ready.items():
-        withheld |= trial.wrench(WITHHELD, {name: _without_plates(estimators[name], each, recording, static)})
+        withheld |= trial.wrench(WITHHELD, name, _without_plates(estimators[name], each, recording, static))
         stepped()
         ahead_of[name] = _ahead(estimators[name], each, horizon_s)
         stepped()
-    markers = trial.ready.measured.markers
-    for cutoff, motion in rigid_motions(trial.calibrated, trial.time, markers, cutoffs).items():
-        withheld |= trial.wrench(WITHHELD, {inverse_name(cutoff): motion.wrench()})
-    frames = span_frames(trial.time, horizon_s)
+    for cutoff, motion in rigid_motions(trial.calibrated, time, markers, cutoffs).items():
+        withheld |= trial.wrench(WITHHELD, inverse_name(cutoff), motion.wrench())
     for cutoff, motion in _classical_ahead(trial, cutoffs, horizon_s).items():
         ahead_of[inverse_name(cutoff)] = motion.markers(), motion.wrench()
-    for name, guess in ((PERSISTENCE, persisted), (LINEAR, lambda a, n: extrapolated(trial.time, a, n))):
-        ahead_of[name] = guess(markers, frames), guess(trial.ready.measured.wrench, frames)
+    ahead_of |= trial.raw_ahead(span_frames(time, horizon_s))
     return with_mean(LEFT_OUT, left_out) | withheld | _ahead_figures(trial, ahead(horizon_s), ahead_of)
 
 
@@ -129,38 +124,17 @@ def left_out_groups(calibrated: CalibratedModel) -> list[list[int]]:
     return groups
 
 
-class _Judged:
-    """A trial's measurements, as methods are judged by them."""
+def _judged(ready: Prepared) -> Judged:
+    """Wrenches along the way the person faces, about the floor's point below the pelvis."""
+    ground = ready.calibrated.ground
+    turn = ground.facing().rotation @ ground.rotation.T
+    below = ContactPaths.of(ready.calibrated).at(ready.measured.markers)[:, 0] * [1.0, 0.0, 1.0]
 
-    def __init__(self, ready: Prepared) -> None:
-        self.ready, self.calibrated, self.time = ready, ready.calibrated, ready.recording.time
-        self.window = evaluation_window(self.time)
-        ground = self.calibrated.ground
-        self.turn = ground.facing().rotation @ ground.rotation.T
-        self.below = ContactPaths.of(self.calibrated).at(ready.measured.markers)[:, 0] * [1.0, 0.0, 1.0]
+    def seen(wrench: Array) -> Array:
+        force, moment = np.split(wrench_about(wrench, below), 2, axis=1)
+        return np.hstack([force @ turn.T, moment @ turn.T])
 
-    def markers(self, yardstick: str, method: str, places: Array, columns: Sequence[int]) -> Figures:
-        """RMS distance (mm) of some markers (T, M, 3), over the window."""
-        measured, w, axes = self.ready.measured.markers, self.window, np.ones(3, dtype=bool)
-        return {
-            (yardstick, self.calibrated.recorded_markers[k], method): marker_rms_mm(measured[w, k], places[w, k], axes)
-            for k in columns
-        }
-
-    def wrench(self, yardstick: str, wrenches: dict[str, Array]) -> Figures:
-        """RMS (N, N m) of each component of wrenches (T, 6), where the plates measure all that acts."""
-        measured = self._seen(self.ready.measured.wrench)[self.window]
-        if not np.isfinite(measured).any():
-            return {}
-        return {
-            (yardstick, component, method): signal_fit(measured[:, k], self._seen(wrench)[self.window, k]).rms
-            for k, component in enumerate(COMPONENTS)
-            for method, wrench in wrenches.items()
-        }
-
-    def _seen(self, wrench: Array) -> Array:
-        force, moment = np.split(wrench_about(wrench, self.below), 2, axis=1)
-        return np.hstack([force @ self.turn.T, moment @ self.turn.T])
+    return Judged(ready.calibrated, ready.measured, seen)
 
 
 def _of(estimate: Estimate, name: str, window: npt.NDArray[np.bool_]) -> Array:
@@ -198,10 +172,10 @@ def _ahead(estimator: Estimator, ready: Prepared, horizon_s: float) -> tuple[Arr
     return motion.markers(), motion.wrench()
 
 
-def _classical_ahead(trial: _Judged, cutoffs: tuple[float, ...], horizon_s: float) -> dict[float, RigidMotion]:
+def _classical_ahead(trial: Judged, cutoffs: tuple[float, ...], horizon_s: float) -> dict[float, RigidMotion]:
     """The rigid model as the angles of the half second until ``horizon_s`` before say it."""
-    time, model = trial.time, fixed_model(trial.calibrated)
-    coordinates = inverse_kinematics(trial.calibrated, filled(time, trial.ready.measured.markers))
+    time, model = trial.measured.time, fixed_model(trial.calibrated)
+    coordinates = inverse_kinematics(trial.calibrated, filled(time, trial.measured.markers))
     past, frames = max(span_frames(time, _PAST_S), _FEWEST_FRAMES), span_frames(time, horizon_s)
     unknown = np.full((past - 1, coordinates.shape[1]), np.nan)
     found = {}
@@ -214,7 +188,7 @@ def _classical_ahead(trial: _Judged, cutoffs: tuple[float, ...], horizon_s: floa
     return found
 
 
-def _ahead_figures(trial: _Judged, yardstick: str, guesses: dict[str, tuple[Array, Array]]) -> Figures:
+def _ahead_figures(trial: Judged, yardstick: str, guesses: dict[str, tuple[Array, Array]]) -> Figures:
     """All methods over the same frames: those that each of them has."""
     finite = {name: np.isfinite(wrench).all(axis=1) for name, (_, wrench) in guesses.items()}
     of_models = [known for name, known in finite.items() if name not in (PERSISTENCE, LINEAR)]
@@ -223,5 +197,7 @@ def _ahead_figures(trial: _Judged, yardstick: str, guesses: dict[str, tuple[Arra
     figures: Figures = {}
     for name, (places, _) in guesses.items():
         figures |= trial.markers(yardstick, name, np.where(posed, places, np.nan), range(places.shape[1]))
-    wrenches = {name: np.where(loaded, wrench, np.nan) for name, (_, wrench) in guesses.items()}
-    return with_mean(yardstick, figures) | trial.wrench(yardstick, wrenches)
+    figures = with_mean(yardstick, figures)
+    for name, (_, wrench) in guesses.items():
+        figures |= trial.wrench(yardstick, name, np.where(loaded, wrench, np.nan))
+    return figures

@@ -3,13 +3,21 @@ any model (the last value held, the last slope carried on)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.filter.measurements import Measurements
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.times import step_of
+from dynakin.results.measures.fit import marker_rms_mm, signal_fit
+from dynakin.results.measures.metrics import evaluation_window
 from dynakin.units import COMPONENTS
 from dynakin.validation.table2 import MARKERS, spread
 
+Array = npt.NDArray[np.float64]
 Figures = dict[tuple[str, str, str], float | None]  # (yardstick, quantity, method) -> RMS in the quantity's unit
 
 WITHHELD, LEFT_OUT = "plates withheld", "marker left out"
@@ -33,7 +41,50 @@ def with_mean(yardstick: str, figures: Figures) -> Figures:
     return means | figures
 
 
-Array = npt.NDArray[np.float64]
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What a trial measured, as methods are judged by it over its window.
+
+    measured: ground frame; wrenches are NaN where the plates do not measure all of it. seen: wrenches (T, 6) -> the
+    same along the axes and about the points (T, 3) by which they are judged.
+    """
+
+    calibrated: CalibratedModel
+    measured: Measurements
+    seen: Callable[[Array], Array] = np.asarray
+
+    @property
+    def window(self) -> npt.NDArray[np.bool_]:
+        """Frames (T,) that errors are taken over."""
+        return evaluation_window(self.measured.time)
+
+    def markers(self, yardstick: str, method: str, places: Array, columns: Iterable[int]) -> Figures:
+        """RMS distance (mm) of some markers of ``places`` (T, M, 3) m."""
+        axes, window = np.array(self.calibrated.spec.markers[0].measured), self.window
+        return {
+            (yardstick, self.calibrated.recorded_markers[k], method): marker_rms_mm(
+                self.measured.markers[window, k], places[window, k], axes
+            )
+            for k in columns
+        }
+
+    def wrench(self, yardstick: str, method: str, wrench: Array) -> Figures:
+        """RMS (N, N m) of each modelled component of a wrench (T, 6) that the plates measure."""
+        measured, given = (self.seen(each)[self.window] for each in (self.measured.wrench, wrench))
+        return {
+            (yardstick, COMPONENTS[k], method): signal_fit(measured[:, k], given[:, k]).rms
+            for k in np.flatnonzero(self.calibrated.spec.wrench_measured)
+            if np.isfinite(measured[:, k]).any()
+        }
+
+    def raw_ahead(self, frames: int) -> dict[str, tuple[Array, Array]]:
+        """Markers and wrench as raw data predict them so many frames on, by method."""
+        time, markers, wrench, _ = self.measured
+        return {
+            PERSISTENCE: (persisted(markers, frames), persisted(wrench, frames)),
+            LINEAR: (extrapolated(time, markers, frames), extrapolated(time, wrench, frames)),
+        }
+
 
 SLOPE_S = 0.01
 """Span of the slope. Chosen in favour of the extrapolation: the best of 10, 20, 50 and 100 ms for the markers and

@@ -20,6 +20,7 @@ from dynakin.model.calibration.joint_motion import (
     distance_sd_m,
     joint_axis,
     joint_centre,
+    off_their_line,
     rigid_motion,
 )
 from dynakin.model.calibration.landmarks import LandmarkFinder
@@ -231,8 +232,7 @@ def _rigid_part(
     while True:
         shape = np.array([_standing(source, name, frames) for name in own])
         paths = np.stack([trial.marker(came) for came in own.values()], axis=1)
-        width = np.linalg.svd(shape - shape.mean(axis=0), compute_uv=False)[1] / np.sqrt(len(shape))
-        if width < _FLAT_M:
+        if off_their_line(shape) < _FLAT_M:
             raise ModelError(f"{where}: the markers of the {part} ({', '.join(own.values())}) lie on a line")
         motion = rigid_motion(shape, paths)
         misfit = _usual(motion)

@@ -45,6 +45,11 @@ def nearest_rotation(covariance: Array) -> Array:
     return np.asarray(u @ vt)
 
 
+def off_their_line(shape: Array) -> float:
+    """Root mean square distance (m) of points (K, 3) from the line that fits them best, in their plane."""
+    return float(np.linalg.svd(shape - shape.mean(axis=0), compute_uv=False)[1] / np.sqrt(len(shape)))
+
+
 def rigid_motion(shape: Array, paths: Array) -> RigidMotion:
     """The rotations and translations by which a shape (K, 3) m fits its markers' paths (T, K, 3) m best, gaps NaN."""
     seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(paths + shape).all(axis=2))

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import Hips
 from dynakin.model.calibration.frames import MarkedTrial
-from dynakin.model.calibration.joint_motion import rigid_motion
+from dynakin.model.calibration.joint_motion import off_their_line, rigid_motion
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.markers.fit import ROOT
 from dynakin.model.markers.match import MarkerKey
@@ -179,7 +179,7 @@ def _beside(
         return None, False
     moving = moving[:: -(-len(moving) // _FRAMES)]
     shape = standing[len(standing) // 2]
-    if len(others) >= _FEWEST and _off_their_line(shape) > _ALONG_M:
+    if len(others) >= _FEWEST and off_their_line(shape) > _ALONG_M:
         motion = rigid_motion(shape, moving[:, :-1])
         local = np.swapaxes(motion.rotations, 1, 2) @ (moving[:, -1] - motion.translations)[:, :, None]
         best = motion.misfit_m <= np.quantile(motion.misfit_m, _BEST)
@@ -197,11 +197,6 @@ def _beside(
 def _seen(paths: Array) -> npt.NDArray[np.bool_]:
     """(T,) frames that show all of (T, K, 3)."""
     return np.asarray(np.isfinite(paths).all(axis=(1, 2)))
-
-
-def _off_their_line(shape: Array) -> float:
-    """Root mean square distance (m) of points (K, 3) from the line that fits them best, in their plane."""
-    return float(np.linalg.svd(shape - shape.mean(axis=0), compute_uv=False)[1] / np.sqrt(len(shape)))
 
 
 def _turned_to(line: Array, paths: Array) -> Array:

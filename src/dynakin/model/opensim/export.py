@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from dynakin.errors import ConfigError
 from dynakin.files import is_file
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.identified import RunConstants
-from dynakin.model.inertia import INERTIA_NAMES, RigidBody
+from dynakin.model.inertia import INERTIA_NAMES, RigidBody, inertia_from
 from dynakin.model.opensim.chains import grows
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.description import Body, Joint, JointAxis, Marker, Offset, OpenSimModel, Vector
@@ -119,9 +117,7 @@ def _body(body: Body, values: Mapping[str, float]) -> Body:
     names = [f"inertia/{body.name}/{name}" for name in INERTIA_NAMES]
     if not any(name in values for name in names):
         return body
-    old = body.rigid.vector
-    new = np.array([values.get(name, value) for name, value in zip(names, old, strict=True)])
-    return Body.of(body.name, RigidBody.from_vector(new))
+    return Body.of(body.name, RigidBody.from_vector(inertia_from(values, body.name, body.rigid.vector)))
 
 
 def _joint(joint: Joint, parent: float, child: float) -> Joint:

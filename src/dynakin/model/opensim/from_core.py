@@ -16,7 +16,7 @@ import scipy
 
 from dynakin.bindings import _core
 from dynakin.model.calibration.posture import turned
-from dynakin.model.inertia import INERTIA_NAMES, RigidBody
+from dynakin.model.inertia import RigidBody, inertia_from
 from dynakin.model.opensim.description import (
     Body,
     Coordinate,
@@ -147,8 +147,7 @@ class _Tree:
         return runs
 
     def _body(self, segment: _core.SegmentSpec) -> Body:
-        names = [f"inertia/{segment.name}/{name}" for name in INERTIA_NAMES]
-        numbers = [self.values.get(name, value) for name, value in zip(names, segment.inertia, strict=True)]
+        numbers = inertia_from(self.values, segment.name, segment.inertia)
         return Body.of(segment.name, RigidBody.from_vector(numbers))
 
     def _joint(self, name: str, parent: str, offset: Offset, child: str, moving: list[JointAxis]) -> Joint:

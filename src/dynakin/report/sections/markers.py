@@ -38,7 +38,7 @@ def marker_section(page: Page) -> Section | None:
             f"Root mean square distance {span} In the plane of the model.",
             wide=[
                 _rms_bars("RMS distance of each marker", rms),
-                _plane_paths("paths", list(names.values()), measured[:, :, :2], estimated[:, :, :2]),
+                _plane_paths(list(names.values()), measured[:, :, :2], estimated[:, :, :2]),
             ],
             folded=_over_time(page, measured, estimated),
             folded_title="Every marker over time",
@@ -118,11 +118,11 @@ def _rms_bars(title: str, rms: dict[str, float | None], most: float | None = Non
     return value_bars(title, "estimated against measured, mm", bars, most, "RMS of each marker, mm")
 
 
-def _plane_paths(key: str, names: list[str], measured: np.ndarray, estimated: np.ndarray) -> Panel:
+def _plane_paths(names: list[str], measured: np.ndarray, estimated: np.ndarray) -> Panel:
     """Paths of the markers in the sagittal plane, (T, M, 2) m, each labelled where it starts."""
     from dynakin.report.figure import new_axes, to_svg  # Matplotlib: only a planar model's page waits
 
-    figure, axes = new_axes(4.3, 4.6)
+    figure, axes = new_axes()
     step = max(1, len(measured) // 400)
     for index in range(len(names)):
         axes.plot(*measured[::step, index].T, color=MEASURED, linewidth=3.0, solid_capstyle="round")
@@ -132,7 +132,9 @@ def _plane_paths(key: str, names: list[str], measured: np.ndarray, estimated: np
     axes.set_xlabel("forward, m")
     axes.set_ylabel("up, m")
     _label_paths(axes, names, estimated[0])
-    return Panel("Paths in the sagittal plane", "seen from the right", to_svg(figure, key, "Marker paths in the plane"))
+    return Panel(
+        "Paths in the sagittal plane", "seen from the right", to_svg(figure, "paths", "Marker paths in the plane")
+    )
 
 
 def _label_paths(axes: Axes, names: list[str], start: np.ndarray) -> None:

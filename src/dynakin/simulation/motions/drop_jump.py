@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -288,12 +289,9 @@ def _fit(posed: _Posed) -> Corrections:
         by_f, by_m = (np.where(flying[:, None], softer * by, by * min(softer, 5.0)) for by in (by_force, by_moment))
         return np.hstack([(force - wanted) / by_f, moment / by_m, straight])
 
-    def stage(softer: float, rounds: int, names: tuple[str, ...], found: Corrections | None) -> Corrections:
-        return fit_corrections(_SIZES, knots, time, lambda more: residuals(more, softer), rounds, names, found)
-
-    found = None
+    found: Corrections | None = None
     for softer, rounds, names in _STAGES:
-        found = stage(softer, rounds, names, found)
+        found = fit_corrections(_SIZES, knots, time, partial(residuals, softer=softer), rounds, names, found)
     assert found is not None
     return found
 

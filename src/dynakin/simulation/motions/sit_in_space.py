@@ -9,18 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.simulation.bodies.body import SimulatedBody
-from dynakin.simulation.bodies.whole_body import SIDES, Sole
+from dynakin.simulation.bodies.whole_body import Sole
 from dynakin.simulation.jets import constant, polynomial
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.movement import Movement, Repetition
 from dynakin.simulation.motions.sit_to_stand import SEAT_FROM_HIP, draw_sittings, sitting_signals
 from dynakin.simulation.motions.squat_in_space import (
+    ARMS,
     Stance,
     Sway,
     balanced_tilt,
     draw_stance,
-    feet_press,
     mid_hip,
+    on_feet,
     over_feet_x,
     plates_below,
     posed_on_feet,
@@ -33,8 +34,7 @@ Array = NDArray[np.float64]
 # Angles (deg) standing, and what sitting adds: feet drawn back under a seat as high as the knee, as people place them
 # before they rise (Janssen et al. 2002, Phys Ther 82:866-879); arms reach forward.
 _ANKLE, _KNEE, _LUMBAR = (8.0, 22.0), (11.0, 98.0), (8.0, -22.0)
-_ARMS = {"arm_flex": (5.0, 55.0), "arm_add": (-9.0, -4.0), "arm_rot": (0.0, 8.0), "elbow_flex": (14.0, 10.0),
-         "pro_sup": (90.0, -15.0)}  # fmt: skip
+_ARMS = ARMS | {"arm_flex": (5.0, 55.0)}
 _LEAST_SHARE, _MOST_SHARE = (
     0.55,
     0.70,
@@ -68,11 +68,10 @@ def sit_in_space(rng: np.random.Generator, body: SimulatedBody, duration_s: floa
         x, y, z = mid_hip(body, stance, level)
         return posed_on_feet(body, stance, jets, (x + sway.of("x", time), y, z + shift + sway.of("z", time)))
 
-    pressed = feet_press(body, stance)
-
     def support(time: Array) -> Support:
-        right, left = (np.tile(pressed[side], (len(time), 1)) for side, _ in SIDES)
-        return Support(right, left, seated=Seated(sitting_signals(time, sittings, shares)[1].value, seat))
+        return replace(
+            on_feet(body, stance, time), seated=Seated(sitting_signals(time, sittings, shares)[1].value, seat)
+        )
 
     return Movement(
         "sit",

@@ -24,7 +24,7 @@ STANDS_AT = np.array([0.35, 0.0, 0.40])  # middle between the ankles, on the lab
 _PLATE_AHEAD_M = 0.08  # of the ankles
 # Angles (deg) while standing, and what the lowest posture adds; the tilt of the pelvis follows from balance.
 _ANKLE, _KNEE, _LUMBAR = (8.0, 22.0), (11.0, 84.0), (8.0, -14.0)
-_ARMS = {"arm_flex": (5.0, 70.0), "arm_add": (-9.0, -4.0), "arm_rot": (0.0, 8.0), "elbow_flex": (14.0, 10.0),
+ARMS = {"arm_flex": (5.0, 70.0), "arm_add": (-9.0, -4.0), "arm_rot": (0.0, 8.0), "elbow_flex": (14.0, 10.0),
          "pro_sup": (90.0, -15.0)}  # fmt: skip
 _OVER_FOOT = 0.30  # the centre of mass, from the ankle towards the toes
 _GAZE = -0.55  # of the trunk's lean, undone by the neck
@@ -52,7 +52,7 @@ class Stance:
     ankle: tuple[float, float] = _ANKLE
     knee: tuple[float, float] = _KNEE
     lumbar: tuple[float, float] = _LUMBAR
-    arms_deg: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(_ARMS))
+    arms_deg: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(ARMS))
 
 
 def draw_stance(rng: np.random.Generator, body: SimulatedBody) -> Stance:
@@ -113,30 +113,25 @@ def squat_in_space(rng: np.random.Generator, body: SimulatedBody, duration_s: fl
         hips = (x + sway.of("x", time), y, z + shift + sway.of("z", time))
         return posed_on_feet(body, stance, jets, hips)
 
-    pressed = feet_press(body, stance)
-
-    def support(time: Array) -> Support:
-        right, left = (np.tile(pressed[side], (len(time), 1)) for side, _ in SIDES)
-        return Support(right, left)
-
     return Movement(
         "squat",
         at,
         f"{len(squats)} repetitions of varying depth and pace",
         tuple(Repetition(s.start_s, s.end_s, s.depth) for s in squats),
-        support=support,
+        support=lambda time: on_feet(body, stance, time),
         footings=plates_below(stance),
     )
 
 
-def feet_press(body: SimulatedBody, stance: Stance) -> dict[str, Array]:
-    """By side, where (3,) m a foot presses when the person is in balance."""
+def on_feet(body: SimulatedBody, stance: Stance, time: Array) -> Support:
+    """Both feet pressing at times (T,) s where they do when the person is in balance."""
     ahead = Sole.of(body.subject).ball[0] * 0.5
-    return {
-        side: flat_ankle(stance, sign) * [1.0, 0.0, 1.0]
+    right, left = (
+        flat_ankle(stance, sign) * [1.0, 0.0, 1.0]
         + ahead * np.array([np.cos(stance.toe_out), 0.0, sign * np.sin(stance.toe_out)])
-        for side, sign in SIDES
-    }
+        for _, sign in SIDES
+    )
+    return Support(np.tile(right, (len(time), 1)), np.tile(left, (len(time), 1)))
 
 
 def plates_below(stance: Stance) -> tuple[Footing, ...]:

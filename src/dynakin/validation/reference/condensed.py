@@ -9,17 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
-from dynakin.model.inertia import INERTIA_NAMES
-from dynakin.model.plan import ModelPlan
-from dynakin.validation.reference.chain import Kinematics, PlanarChain
-from dynakin.validation.reference.regressor import (
-    IN_PLANE,
-    PLANAR_NAMES,
-    parameter_names,
-    parameter_scales,
-    table_parameters,
-    wrench_regressor,
-)
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -66,38 +55,6 @@ class Condensed:
         return phi
 
 
-def condense(
-    chain: PlanarChain,
-    plan: ModelPlan,
-    kinematics: Kinematics,
-    wrench: Array,
-    *,
-    mass_kg: float | None,
-    sigma: tuple[float, float, float],
-) -> Condensed:
-    """Stack the frames in which coordinates and wrench are known.
-
-    Args:
-        wrench: (T, 6) measured, ground on person, about the ground origin.
-        mass_kg: total mass held by the soft constraint; None: not held.
-        sigma: declared standard deviations of fx, fy (N) and mz (N m).
-
-    Raises:
-        RecordingError: too few such frames.
-    """
-    flags = [dict(zip(INERTIA_NAMES, plan.estimated_inertia(link.name), strict=True)) for link in chain.links]
-    return stacked(
-        parameter_names(chain),
-        table_parameters(chain),
-        parameter_scales(chain),
-        np.array([entry[name] for entry in flags for name in PLANAR_NAMES]),
-        wrench_regressor(chain, kinematics),
-        wrench[:, IN_PLANE],
-        mass_kg=mass_kg,
-        sigma=sigma,
-    )
-
-
 def stacked(
     names: tuple[str, ...],
     table: Array,
@@ -109,7 +66,7 @@ def stacked(
     mass_kg: float | None = None,
     sigma: Sequence[float],
 ) -> Condensed:
-    """The same of any regressor of the wrench, in the plane or in space.
+    """Stack the frames in which coordinates and wrench are known, of any regressor of the wrench.
 
     Args:
         names, table, scale, estimated: (p,) as in `Condensed`.

@@ -12,13 +12,20 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from dynakin.model.inertia import RigidBody
+from dynakin.model.inertia import INERTIA_NAMES, RigidBody
 from dynakin.model.plan import ModelPlan
 from dynakin.settings.model import Bounds
 from dynakin.validation.reference.base_parameters import BaseParameters, base_parameters
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
-from dynakin.validation.reference.condensed import DECLARED_SIGMA, Condensed, condense
-from dynakin.validation.reference.regressor import IN_PLANE, parameter_names, wrench_regressor
+from dynakin.validation.reference.condensed import DECLARED_SIGMA, Condensed, stacked
+from dynakin.validation.reference.regressor import (
+    IN_PLANE,
+    PLANAR_NAMES,
+    parameter_names,
+    parameter_scales,
+    table_parameters,
+    wrench_regressor,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -68,7 +75,17 @@ def identify(
     Raises:
         RecordingError: too few frames with all coordinates and the wrench.
     """
-    problem = condense(chain, plan, kinematics, wrench, mass_kg=mass_kg, sigma=sigma)
+    flags = [dict(zip(INERTIA_NAMES, plan.estimated_inertia(link.name), strict=True)) for link in chain.links]
+    problem = stacked(
+        parameter_names(chain),
+        table_parameters(chain),
+        parameter_scales(chain),
+        np.array([entry[name] for entry in flags for name in PLANAR_NAMES]),
+        wrench_regressor(chain, kinematics),
+        wrench[:, IN_PLANE],
+        mass_kg=mass_kg,
+        sigma=sigma,
+    )
     base = base_parameters(problem)
     free = free_parameters(problem, base.rank)
     bounded, at_bound = _bounded(problem, plan, bounds or Bounds())
