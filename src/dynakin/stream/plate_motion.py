@@ -94,7 +94,7 @@ class LivePlateMotion:
             self._every_s = min(2.0 * self._every_s, RARELY_S)
         up = axis_vector(self._initial.ground.vertical)
         plates = [floor_plate(name, wrenches[:, p], up) for p, name in enumerate(self._plates)]
-        self.turned = turned_axes(needed, plates, self._initial, known, _REMEDY)
+        self.turned = turned_axes(needed, plates, known, _REMEDY)
         self.delay = None if self.turned else plates_delay(needed, total)
         ratio = float(total[judged, 1].mean() / needed.force[judged, 1].mean())
         foreign = float(np.mean(~whole[known]))

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from dynakin.filter.ground.lean import turned_by_lean
 from dynakin.filter.ground.needed import NEAR, Needed
-from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.plates.axes import TURNS, PlateAxes, turned_feet
 from dynakin.recordings.recording import Plate
 from dynakin.results.naming import listed
@@ -29,9 +28,7 @@ LARGE, SMALL_N = 0.02, 4.0
 _LONG_S = 1.0
 
 
-def turned_axes(
-    needed: Needed, plates: Sequence[Plate], initial: CalibratedModel, known: Flags, remedy: str = ""
-) -> str | None:
+def turned_axes(needed: Needed, plates: Sequence[Plate], known: Flags, remedy: str = "") -> str | None:
     """A sentence on plates whose horizontal force fits the motion once their axes are others; None where none are, or
     something was declared that pushes or pulls as well.
 
@@ -39,12 +36,12 @@ def turned_axes(
         known: (T,) frames in which the sum over the plates is all that bears the person. remedy: where to correct them;
             "": in the file that they were read from.
     """
-    if initial.contacts or not plates:
+    if needed.initial.contacts or not plates:
         return None
     found = (
-        turned_feet(plates, initial.ground, needed.rate)
-        or _turned_sum(needed, plates, initial, known)
-        or turned_by_lean(plates, initial, needed.root, needed.rate)
+        turned_feet(plates, needed.initial.ground, needed.rate)
+        or _turned_sum(needed, plates, known)
+        or turned_by_lean(needed, plates)
     )
     if found is None:
         return None
@@ -55,9 +52,10 @@ def turned_axes(
     return f"{found}. {remedy}; if something else pulls the person, declare it (--contact)"
 
 
-def _turned_sum(needed: Needed, plates: Sequence[Plate], initial: CalibratedModel, known: Flags) -> str | None:
+def _turned_sum(needed: Needed, plates: Sequence[Plate], known: Flags) -> str | None:
     """Where the sum of some turned, or all, fits what the centre of mass needs."""
-    forces = np.stack([initial.ground.vectors_to_ground(plate.force) for plate in plates])
+    ground = needed.initial.ground
+    forces = np.stack([ground.vectors_to_ground(plate.force) for plate in plates])
     total = np.where(known[:, None], forces.sum(axis=0), np.nan)
     upright = needed.force.copy()
     upright[:, 1] = total[:, 1]
@@ -67,7 +65,7 @@ def _turned_sum(needed: Needed, plates: Sequence[Plate], initial: CalibratedMode
     now = needed.misfit(total)
     if now < (SMALL_N if needed.judged_s(total) > _LONG_S else LARGE * needed.weight):
         return None
-    axes = [PlateAxes(plate, initial.ground) for plate in plates]
+    axes = [PlateAxes(plate, ground) for plate in plates]
     every = range(len(forces))
     subsets: list[Sequence[int]] = [every, *([k] for k in every if len(forces) > 1)]
     best, how = now, ""

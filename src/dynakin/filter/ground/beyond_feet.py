@@ -6,12 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import runs
-from dynakin.filter.ground.mass_centre import mass_centre
+from dynakin.filter.ground.needed import Needed
 from dynakin.messages import Message, warning
-from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.recording import Recording
-from dynakin.recordings.times import rate_of, spans
+from dynakin.recordings.times import spans
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -22,12 +20,13 @@ BEYOND_M, BEYOND_S = 0.25, 0.5
 something else to bear the person: a shoe is 0.05 larger, who lies or is on hands and toes has it 0.5 to 0.9 away."""
 
 
-def beyond_the_feet(initial: CalibratedModel, recording: Recording, markers: Array) -> Flags:
+def beyond_the_feet(needed: Needed) -> Flags:
     """(T,) frames in which the ground would have to push there, by the motion of the centre of mass; none of a body
     with a foot that nobody sees."""
+    initial, markers = needed.initial, needed.markers
     beyond = np.zeros(len(markers), dtype=bool)
     feet = [[m for m, n in enumerate(initial.recorded_markers) if n in own] for own in initial.foot_markers.values()]
-    found = mass_centre(initial, recording.time, markers) if len(feet) > 1 and all(feet) else None
+    found = needed.centre if len(feet) > 1 and all(feet) else None
     if found is None:
         return beyond
     soles = markers[:, [m for own in feet for m in own]]
@@ -39,7 +38,7 @@ def beyond_the_feet(initial: CalibratedModel, recording: Recording, markers: Arr
         far = distance_to_hull(at, soles[:, :, [0, 2]]) > BEYOND_M
     far &= found.known & (upward > 0.5 * GRAVITY_M_S2) & np.isfinite(soles).all(axis=(1, 2))
     for first, end in runs(far):
-        beyond[first:end] = end - first >= BEYOND_S * rate_of(recording.time)
+        beyond[first:end] = end - first >= BEYOND_S * needed.rate
     for first, end in runs(~found.known):  # not judged: as its neighbours are
         sides = [bool(beyond[k]) for k in (first - 1, end) if 0 <= k < len(beyond)]
         beyond[first:end] = bool(sides) and all(sides)

@@ -15,10 +15,9 @@ import numpy.typing as npt
 
 from dynakin.arrays import rms_length, runs, widened
 from dynakin.filter.ground.load_ratio import AMPLITUDE, VIGOROUS, load_ratio, window_means
-from dynakin.filter.ground.mass_centre import REACH_S, low_passed, mass_centre
-from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.filter.ground.mass_centre import REACH_S, low_passed
+from dynakin.filter.ground.needed import Needed, smoothed
 from dynakin.recordings.resampling import filled
-from dynakin.recordings.times import rate_of
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -30,8 +29,6 @@ EXCESS = 0.2
 EDGE = 0.06
 """Once it is there, it lasts as long as this part is missing, but no longer than `SPREAD_S` more at either end."""
 SPREAD_S = 0.3
-SMOOTH_S = 0.05
-"""Standard deviation of the Gaussian by which the difference is smoothed: -3 dB at 2.6 Hz."""
 LASTING, LASTING_S = 0.05, 1.0
 """Less is enough where its mean over a second is: a hand on a rail. Well measured recordings stay below 0.025, a run at
 5 m/s below 0.04, simulated ones below 0.01; a rail that bears a tenth makes 0.06 to 0.09."""
@@ -84,18 +81,12 @@ class Closure:
 
 
 def closure(
-    initial: CalibratedModel,
-    time: Array,
-    markers: Array,
-    wrench: Array,
-    claimed: Flags,
-    may_bear: Flags | None = None,
-    may_pull: Flags | None = None,
+    needed: Needed, wrench: Array, claimed: Flags, may_bear: Flags | None = None, may_pull: Flags | None = None
 ) -> Closure | None:
     """Compare the plates' sum with the motion of the centre of mass.
 
     Args:
-        markers: (T, M, 3) m, ground frame, NaN missing. wrench: (T, 6), the sum over the plates.
+        wrench: (T, 6), the sum over the plates.
         claimed: (T,) frames in which that sum is thought to be all that bears the person; only they are judged.
         may_bear, may_pull: (T,) frames in which some declared contact without a plate may push the person up, or down;
             not given: none is declared.
@@ -104,17 +95,16 @@ def closure(
         None where nothing can be judged.
     """
     claimed = claimed & np.isfinite(wrench).all(axis=1)
-    found = mass_centre(initial, time, markers) if claimed.any() else None
+    found = needed.centre if claimed.any() else None
     if found is None:
         return None
-    centre, acceleration, rate = found.path, found.acceleration, rate_of(time)
+    initial, rate, weight = needed.initial, needed.rate, needed.weight
+    centre, acceleration, need = found.path, found.acceleration, needed.force
     judged = found.known & ~widened(~claimed, round(REACH_S * rate))
     if not judged.any():
         return None
     have = low_passed(filled(wrench, np.asarray(~np.isfinite(wrench).all(axis=1))), rate)
     axes = np.array(initial.spec.wrench_measured[:3])
-    weight = initial.weighed_kg * GRAVITY_M_S2
-    need = found.needed_force(initial.weighed_kg)
     vigorous = bool(need[judged, 1].max() > VIGOROUS * weight)
     weighed = (have[:, 1], judged) if vigorous else (wrench[:, 1], found.known & claimed)
     amplitude = AMPLITUDE if vigorous else 0.0
@@ -123,7 +113,7 @@ def closure(
     declared = may_bear if ratio is None or ratio < 1.0 else may_pull
     steady = ratio is not None and declared is not None and _all_the_time(ratio, judged, declared, rate)
     ratio = 1.0 if steady else ratio
-    need *= 1.0 if ratio is None else ratio  # a mass that is somewhat wrong is no contact
+    need = need * (1.0 if ratio is None else ratio)  # a mass that is somewhat wrong is no contact
     missing = np.where(axes, need - have[:, :3], 0.0)
     excess = smoothed(missing, judged, rate)
     zmp = centre - centre[:, [1]] * acceleration / (acceleration[:, [1]] + GRAVITY_M_S2).clip(1.0)
@@ -164,9 +154,9 @@ def _too_much(need: Array, have: Array, judged: Flags, weight: float, rate: floa
     return float(middle) if middle > _TOO_MUCH and high - low < _STEADY * middle else None
 
 
-def plates_misfit(initial: CalibratedModel, time: Array, markers: Array, wrench: Array) -> float | None:
+def plates_misfit(needed: Needed, wrench: Array) -> float | None:
     """RMS of the excess, N, over all frames in which the wrench (T, 6) is known; None where nothing can be judged."""
-    found = closure(initial, time, markers, wrench, np.ones(len(time), dtype=bool))
+    found = closure(needed, wrench, np.ones(len(wrench), dtype=bool))
     return None if found is None else float(rms_length(found.excess))
 
 
@@ -209,13 +199,3 @@ def _as_beside(undeclared: Flags, judged: Flags, claimed: Flags) -> Flags:
         sides = [bool(undeclared[k]) for k in (first - 1, end) if 0 <= k < len(judged) and judged[k]]
         found[first:end] = bool(sides) and all(sides)
     return found
-
-
-def smoothed(values: Array, judged: Flags, rate: float) -> Array:
-    """Gaussian mean (`SMOOTH_S`) of values (T, C) over the judged frames alone; NaN elsewhere."""
-    reach = round(4.0 * SMOOTH_S * rate)
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (SMOOTH_S * rate)) ** 2)
-    weighed = np.column_stack([np.where(judged[:, None], values, 0.0), judged])
-    sums = np.column_stack([np.convolve(column, kernel)[reach : reach + len(judged)] for column in weighed.T])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(judged[:, None], sums[:, :-1] / sums[:, -1:], np.nan)

@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms
-from dynakin.filter.ground.closure import SMOOTH_S, smoothed
-from dynakin.filter.ground.needed import Needed
+from dynakin.filter.ground.needed import SMOOTH_S, Needed, smoothed
 from dynakin.messages import Message, warning
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.recording import Plate

@@ -26,7 +26,6 @@ from dynakin.filter.ground.declared import (
 )
 from dynakin.filter.ground.expected import Bearing
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
-from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.on_ground import OnGround
 from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
@@ -112,7 +111,7 @@ def _without_plates(on: OnGround) -> tuple[Ground, Array]:
     initial, recording = on.trial.initial, on.trial.recording
     if on.loads is None or initial.contacts:
         return Ground(on.loads, np.zeros(len(wrench), dtype=bool), on.may, False, None, (said,), (said,)), wrench
-    beyond = beyond_the_feet(initial, recording, on.trial.markers)
+    beyond = beyond_the_feet(on.trial.needed)
     texts = (said, *([beyond_in_words(beyond, recording.time)] if beyond.any() else []))
     loads = on.loads.with_undeclared(beyond)
     return Ground(loads, beyond, on.may, False, None, texts, texts), wrench
@@ -124,10 +123,10 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
     notes = [note("plates", taken_in_words(plate, own)) for plate, own in on.taken.items()]
     wrench = trial.wrench
     all_of_it, righted, plates = wrench, None, PlateErrors(on.shear)
-    if on.needed is not None and loads is not None:
-        all_of_it = on.all_of_it(on.needed)
+    if loads is not None:
+        all_of_it = on.all_of_it
         first = judged_by_motion(on, [all_of_it], None) if on.unmeasured else None
-        plates = _plate_errors(on, on.needed, loads, first)
+        plates = _plate_errors(on, loads, first)
         notes += plates.said
         righted = plates.gains.righted(wrench, trial.wrenches)
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
@@ -179,7 +178,7 @@ class PlateErrors(NamedTuple):
     borne: Flags | Literal[False] = False
 
 
-def _plate_errors(on: OnGround, needed: Needed, loads: FootLoads, first: Carried | None) -> PlateErrors:
+def _plate_errors(on: OnGround, loads: FootLoads, first: Carried | None) -> PlateErrors:
     """Where no declared contact may bear that bears at all.
 
     Args:
@@ -188,26 +187,27 @@ def _plate_errors(on: OnGround, needed: Needed, loads: FootLoads, first: Carried
     bears = np.zeros_like(on.may) if first is None else first.bears & loads.total_known[:, None]
     free: Flags = np.asarray(~(on.may & bears.any(axis=0)).any(axis=1))
     touched = np.array([name != SEAT for name in on.trial.initial.contacts], dtype=bool) & on.may[free].any(axis=0)
-    total = np.where(free[:, None], on.total(loads, needed), np.nan)
-    if (found := _rate_or_load(on, needed, total, touched)) is not None:
+    total = np.where(free[:, None], on.total(loads), np.nan)
+    if (found := _rate_or_load(on, total, touched)) is not None:
         return found
     if on.shear.unmeasured:
         return PlateErrors(on.shear)
-    found = _shear(on, needed, loads, first, total, touched)
+    found = _shear(on, loads, first, total, touched)
     if np.any(found.borne):
         return found
-    gains = _gains(on, needed, loads, free, first)
+    gains = _gains(on, loads, free, first)
     return PlateErrors(found.shear, gains, [*found.shear.notes, *gains.notes])
 
 
-def _rate_or_load(on: OnGround, needed: Needed, total: Array, touched: Flags) -> PlateErrors | None:
+def _rate_or_load(on: OnGround, total: Array, touched: Flags) -> PlateErrors | None:
     """Where the force (T, 3) changes as with another rate of the markers, or a load in the hands, or as what the
     declared contacts ``touched`` (C,) bear: then no more can be said of the plates. None where it does not."""
-    initial, recording = on.trial.initial, on.trial.recording
+    needed, initial = on.trial.needed, on.trial.initial
     found = fitting_rate(needed, total)
-    if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
+    # a low-pass takes accelerations, too
+    if found is not None and not (found[1] > 1.0 and found_low_pass(on.trial.recording)):
         return PlateErrors(on.shear, said=[warning("rate", wrong_rate_in_words(needed.rate, *found))])
-    if (load_kg := carried_in_hands(needed, initial, on.trial.markers, total)) is None:
+    if (load_kg := carried_in_hands(needed, total)) is None:
         return None
     if not touched.any():
         return PlateErrors(on.shear, said=[warning("carried", carried_in_words(load_kg))])
@@ -215,15 +215,14 @@ def _rate_or_load(on: OnGround, needed: Needed, total: Array, touched: Flags) ->
     return PlateErrors(on.shear, said=[note("carried", held_in_words(load, initial, touched))], borne=touched)
 
 
-def _shear(
-    on: OnGround, needed: Needed, loads: FootLoads, first: Carried | None, total: Array, touched: Flags
-) -> PlateErrors:
+def _shear(on: OnGround, loads: FootLoads, first: Carried | None, total: Array, touched: Flags) -> PlateErrors:
     """By how much the horizontal forces of the total (T, 3) are off, or the contacts ``touched`` (C,) that it is laid
     to."""
+    needed = on.trial.needed
     shear = found_shear(needed, total)
     if first is None or first.found is None:
         return PlateErrors(shear)
-    whole = found_shear(needed, on.total(loads, needed))
+    whole = found_shear(needed, on.total(loads))
     near = acts_at(first.found, loads.total_known, pressed_at(on.trial.wrench), on.places, mean=True)
     if any(whole.zero) and near < AT_PLATE:
         return PlateErrors(whole)  # the plates', whoever is declared
@@ -233,9 +232,9 @@ def _shear(
     return PlateErrors(NO_SHEAR if near * AT_PLATE > 1.0 else replace(shear, notes=()), said=said, borne=touched)
 
 
-def _gains(on: OnGround, needed: Needed, loads: FootLoads, free: Flags, first: Carried | None) -> PlateGains:
+def _gains(on: OnGround, loads: FootLoads, free: Flags, first: Carried | None) -> PlateGains:
     """What is known of them where the declared contacts may bear, too, as far as it acts at the plates."""
-    plates, wrenches = on.trial.recording.plates, on.trial.wrenches
+    needed, plates, wrenches = on.trial.needed, on.trial.recording.plates, on.trial.wrenches
     gains = found_gains(needed, plates, wrenches, loads.total_known)
     if not gains.notes or first is None or first.found is None or free[loads.total_known].all():
         return gains

@@ -13,11 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms, runs
-from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.filter.ground.needed import Needed
 from dynakin.recordings.plates.axes import TURNS, PlateAxes
 from dynakin.recordings.recording import Plate
 from dynakin.results.naming import listed
-from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -36,21 +35,6 @@ ASIDE, ACROSS, ACROSS_SLOPE = 0.04, -0.5, -0.2
 """Across it, the mean with it (the ground pushes a foot inwards): correlation and slope of an axis that is reversed,
 where feet lie so far aside (RMS of the lean; a run's 0.01 to 0.03 show nothing). On those plates 0.01 to 0.97 and 0.01
 to 0.8."""
-BESIDE_M = 0.03
-"""How far the mean of the pelvis' markers may lie beside its middle: three quarters of `ASIDE` under a centre of mass
-1 m up. Those of one side (0.09 to 0.13 m) make a body lean over that foot as it does over neither."""
-
-
-def root_path(initial: CalibratedModel, markers: Array) -> Array:
-    """(T, 3) m, ground frame: mean of the markers (T, M, 3) on the pelvis; NaN where one of them is missing that most
-    frames show, and throughout where they show one side of it alone."""
-    roots = initial.tree.roots
-    on_root = [k for k, marker in enumerate(initial.spec.markers) if marker.segment in roots]
-    own, places = markers[:, on_root], np.array([initial.spec.markers[k].position for k in on_root]).reshape(-1, 3)
-    often = np.isfinite(own).all(axis=2).mean(axis=0) > 0.5
-    if not often.any() or abs(places[often, 2].mean()) > BESIDE_M:
-        return np.full((len(markers), 3), np.nan)
-    return np.asarray(own[:, often].mean(axis=1))
 
 
 def _passing(on: Flags, arm: Array, rate_hz: float) -> Flags:
@@ -84,20 +68,16 @@ class _Lean:
         return np.asarray(self.axes.turned(self._push, turn) @ self._way.T)
 
 
-def turned_by_lean(plates: Sequence[Plate], initial: CalibratedModel, root: Array, rate_hz: float) -> str | None:
+def turned_by_lean(needed: Needed, plates: Sequence[Plate]) -> str | None:
     """A sentence on plates, all together or one, that push a travelling body against its lean; None where none do, or
-    nothing can be said.
-
-    Args:
-        root: (T, 3) m, as `root_path` gives it.
-    """
-    ground, weight = initial.ground, initial.weighed_kg * GRAVITY_M_S2
+    nothing can be said."""
+    ground, weight = needed.initial.ground, needed.weight
     leans = dict[str, _Lean]()
     for plate in plates:
         force, cop = ground.vectors_to_ground(plate.force), ground.points_to_ground(plate.cop)
-        arm = root - cop
+        arm = needed.root - cop
         on = (np.nan_to_num(force[:, 1]) > LOADED * weight) & np.isfinite(arm).all(axis=1) & (arm[:, 1] > 0.0)
-        on = _passing(on, arm, rate_hz)
+        on = _passing(on, arm, needed.rate)
         if not on.any():
             continue
         lean, push = (values[on][:, [0, 2]] / values[on][:, [1]] for values in (arm, force))

@@ -37,13 +37,17 @@ _CORRECT_MOMENTS = (
 
 @dataclass(frozen=True, eq=False)
 class GroundTrial:
-    """What is judged: markers (T, M, 3) m, of the model, ground frame; assigned, tolerance: as for `known_ground`."""
+    """What is judged: a recording's plates by its motion; assigned, tolerance: as for `known_ground`."""
 
     recording: Recording
-    initial: CalibratedModel
-    markers: Array
+    needed: Needed
     assigned: Mapping[str, str] | None
     tolerance: float | None
+
+    @property
+    def initial(self) -> CalibratedModel:
+        """The person."""
+        return self.needed.initial
 
     @cached_property
     def wrench(self) -> Array:
@@ -74,7 +78,6 @@ class OnGround:
         may: (T, C) frames in which each of these may bear. by_plate: (C,) those that a plate measures; taken:
             plates that are theirs though nobody said so.
         check: of the plates; None without any. shear: what is known of their horizontal forces before they are judged.
-        needed: what the motion needs; None of a model that stands on its root.
     """
 
     trial: GroundTrial
@@ -83,9 +86,8 @@ class OnGround:
     may: Flags
     by_plate: list[bool]
     taken: Mapping[str, tuple[str, ...]]
-    check: PlateCheck | None
-    shear: Shear
-    needed: Needed | None
+    check: PlateCheck | None = None
+    shear: Shear = NO_SHEAR
 
     @staticmethod
     def of(trial: GroundTrial) -> OnGround:
@@ -96,14 +98,14 @@ class OnGround:
         """
         recording, initial = trial.recording, trial.initial
         loads = _loads_of_feet(trial)
-        paths, may = declared_contacts(initial, trial.markers)
+        paths, may = declared_contacts(initial, trial.needed.markers)
         taken = dict[str, tuple[str, ...]]()
         if loads is not None and initial.contacts and recording.plates:
             taken = plates_of_their_own(recording, initial, loads, paths, may, trial.assigned or {})
             loads = _loads_of_feet(trial, taken) if taken else loads
         by_plate = [loads is not None and name in loads.others for name in initial.contacts]
         may &= ~np.array(by_plate, dtype=bool)
-        found = OnGround(trial, loads, paths, may, by_plate, taken, None, NO_SHEAR, None)
+        found = OnGround(trial, loads, paths, may, by_plate, taken)
         if not recording.plates:
             return found
         # steps off the plates: their mean load is no mass
@@ -123,21 +125,19 @@ class OnGround:
                 f"{recording.plates_file}: the plates measure the vertical force only (horizontal forces are 0, or "
                 "follow it), and this model takes all of the force: export the horizontal forces as well"
             )
-        needed = None if loads is None else Needed(initial, recording.time, trial.markers)
-        if needed is not None and loads is not None and not shear.unmeasured:
-            wrong = turned_axes(needed, recording.plates, initial, loads.total_known)
-            if wrong:
-                raise RecordingError(f"{recording.plates_file}: {wrong}")
+        known = None if loads is None or shear.unmeasured else loads.total_known
+        if known is not None and (wrong := turned_axes(trial.needed, recording.plates, known)):
+            raise RecordingError(f"{recording.plates_file}: {wrong}")
         if turned:  # by the forces as well where the corners are
             raise RecordingError(f"{recording.plates_file}: {turned}")
-        return replace(found, check=check, shear=shear, needed=needed)
+        return replace(found, check=check, shear=shear)
 
     def coarse_delay(self) -> Delay | None:
         """By how much the plates lag, to some milliseconds; None where they are in step, or nothing can be said."""
-        if self.needed is None or self.loads is None:
+        if self.loads is None or self.check is None or self.check.unused:
             return None
-        needed = self.needed.vertically() if self.shear.unmeasured else self.needed
-        return plates_delay(needed, self.total(self.loads, self.needed))
+        needed = self.trial.needed
+        return plates_delay(needed.vertically() if self.shear.unmeasured else needed, self.total(self.loads))
 
     @property
     def unmeasured(self) -> list[int]:
@@ -149,14 +149,15 @@ class OnGround:
         """(T, C, 3) m of those."""
         return self.paths[:, [1 + c for c in self.unmeasured]]
 
-    def all_of_it(self, needed: Needed) -> Array:
+    @property
+    def all_of_it(self) -> Array:
         """The total wrench (T, 6), with the motion's horizontal force where plates have none."""
         wrench = self.trial.wrench
-        return needed.with_horizontal(wrench) if self.shear.unmeasured else wrench
+        return self.trial.needed.with_horizontal(wrench) if self.shear.unmeasured else wrench
 
-    def total(self, loads: FootLoads, needed: Needed) -> Array:
+    def total(self, loads: FootLoads) -> Array:
         """(T, 3) N of all plates, where that is all that bears the person; NaN elsewhere."""
-        return np.where(loads.total_known[:, None], self.all_of_it(needed)[:, :3], np.nan)
+        return np.where(loads.total_known[:, None], self.all_of_it[:, :3], np.nan)
 
 
 def _loads_of_feet(trial: GroundTrial, taken: Mapping[str, tuple[str, ...]] | None = None) -> FootLoads | None:
