@@ -20,7 +20,7 @@ from dynakin.bindings import _core
 from dynakin.cli.prepared import assumed
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.closure import closure
-from dynakin.filter.ground.judged import Ground
+from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.impossible import impossible
 from dynakin.filter.sight import LiveSight

@@ -3,5 +3,5 @@
 `known.known_ground` is what a run asks: plates are put to zero and brought into step (`coarse_delay`, `fine_delay`);
 who stands where (`on_ground`) is judged (`judged`) by what the motion needs of the ground (`needed`, `closure`), each
 kind of error in a room of its own.
-`expected` says what each contact may bear meanwhile.
+What is known then is one value (`ground.Ground`), live as in files; `expected` says what each contact may bear by it.
 """

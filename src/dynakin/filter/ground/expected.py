@@ -18,6 +18,7 @@ import scipy.linalg
 from dynakin.arrays import filled, mean_seen
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
 from dynakin.filter.ground.gain import SENSOR_M
+from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.shear import NO_SHEAR, Shear
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
@@ -81,32 +82,16 @@ class Prior(NamedTuple):
     spread: Array
 
 
-class Bearing(NamedTuple):
-    """What bears the person: feet, the C declared contacts, or something else.
-
-    Attributes:
-        loads: of each foot, by the plates.
-        undeclared: (T,) frames in which something else bears the person.
-        bears: (T, C) frames in which a declared contact may bear; where plates measure it, these say.
-        shear: by how much more than usual the plates' horizontal forces may be off.
-        off_gain: (T, F) part of its load by which the plate under each foot may be off; None: none is.
-    """
-
-    loads: FootLoads
-    undeclared: Flags
-    bears: Flags
-    shear: Shear = NO_SHEAR
-    off_gain: Array | None = None
-
-
-def expected_loads(bearing: Bearing, initial: CalibratedModel, noise: Noise, paths: Array) -> ContactLoads:
+def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths: Array) -> ContactLoads:
     """The feet's wrenches, those of the declared contacts and, last, the residual: what neither they nor the model
     explain, on the root.
 
     Args:
+        ground: of a model with feet; declared contacts may bear, and where plates measure them, these say.
         paths: (T, 1 + C, 3) m, where the root is and where the declared contacts act (`ContactPaths`).
     """
-    loads, undeclared, bears, shear, off_gain = bearing
+    assert ground.loads is not None
+    loads, undeclared, bears, shear = ground.loads, ground.undeclared, ground.bears, ground.shear
     weight, root, C = initial.weighed_kg * GRAVITY_M_S2, paths[:, 0], len(initial.contacts)
     feet = _CONTACT[loads.reason]
     frames, F = feet.shape
@@ -131,7 +116,7 @@ def expected_loads(bearing: Bearing, initial: CalibratedModel, noise: Noise, pat
     places = np.concatenate([loads.soles.middle, paths[:, 1:]], axis=1)
     places = np.where(np.isfinite(places), places, (root * [1.0, 0.0, 1.0])[:, None])
     gains = np.zeros((frames, K))
-    gains[:, :F] = 0.0 if off_gain is None else off_gain
+    gains[:, :F] = 0.0 if ground.off_gain is None else ground.off_gain
     by_plates = plate_errors(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), shear, gains.reshape(-1))
     errors[:, each, :, each] = by_plates.reshape(frames, K, 6, 6).swapaxes(0, 1)
     for k in range(K):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -24,8 +24,8 @@ from dynakin.filter.ground.declared import (
     low_beside_feet,
     taken_in_words,
 )
-from dynakin.filter.ground.expected import Bearing
 from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
+from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.on_ground import OnGround
 from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
@@ -43,48 +43,6 @@ from dynakin.settings.contacts import SEAT
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class Ground:
-    """What is known of the ground reaction over a recording.
-
-    Attributes:
-        loads: of each foot; None of a model that stands on its root.
-        undeclared: (T,) frames in which something bears or pulls the person that no plate measures (a seat, a rail, a
-            cable), wherever it acts: of the moments only those between the plates and the thighs are known.
-        bears: (T, C) frames in which each declared contact bears, or may, where no plate measures it.
-        usable: whether the plates are used at all.
-        load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
-        shear: by how much the plates' horizontal forces are off.
-        off_gain: (T, F) part of its load by which the plate under each foot may be off; None: nothing contradicts it.
-        notes: what there is to say. reasons: those of them that say why something is not measured.
-        behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how far they
-            may be out of it still; 0: no farther than usual.
-        in_hands_kg: what the plates carry more than the mass, where that is more than they are usually off by: the
-            hands may hold it.
-        doubt: a sentence where the plates contradict the mass.
-    """
-
-    loads: FootLoads | None
-    undeclared: Flags
-    bears: Flags
-    usable: bool
-    load_ratio: float | None
-    notes: tuple[Message, ...]
-    reasons: tuple[Message, ...]
-    shear: Shear = NO_SHEAR
-    off_gain: Array | None = None
-    behind_s: float = 0.0
-    clock_sd_s: float = 0.0
-    in_hands_kg: float = 0.0
-    doubt: Message | None = None
-
-    def bearing(self) -> Bearing | None:
-        """What bears the person; None of a model that stands on its root."""
-        if self.loads is None:
-            return None
-        return Bearing(self.loads, self.undeclared, self.bears, self.shear, self.off_gain)
 
 
 def judged(on: OnGround) -> tuple[Ground, Array]:
@@ -110,11 +68,11 @@ def _without_plates(on: OnGround) -> tuple[Ground, Array]:
     said, wrench = note("plates", text), on.trial.wrench
     initial, recording = on.trial.initial, on.trial.recording
     if on.loads is None or initial.contacts:
-        return Ground(on.loads, np.zeros(len(wrench), dtype=bool), on.may, False, None, (said,), (said,)), wrench
+        return Ground(on.loads, np.zeros(len(wrench), dtype=bool), on.may, notes=(said,), reasons=(said,)), wrench
     beyond = beyond_the_feet(on.trial.needed)
     texts = (said, *([beyond_in_words(beyond, recording.time)] if beyond.any() else []))
     loads = on.loads.with_undeclared(beyond)
-    return Ground(loads, beyond, on.may, False, None, texts, texts), wrench
+    return Ground(loads, beyond, on.may, notes=texts, reasons=texts), wrench
 
 
 def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
@@ -157,10 +115,12 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
     if loads is not None or used < n:
         notes.append(note("plates", f"The total wrench is measured in {used} of {n} frames."))
     notes += reasons
-    texts = tuple(notes), tuple(reasons)
     off_gain = None if loads is None or not plates.gains.notes else plates.gains.of_feet(loads)
-    found = Ground(loads, undeclared, carries.bears, used > 0, carries.load_ratio, *texts, plates.shear, off_gain)
-    return replace(found, in_hands_kg=max(in_hands_kg, held_kg)), wrench
+    found = Ground(
+        loads, undeclared, carries.bears, plates.shear, off_gain, used > 0, carries.load_ratio, tuple(notes),
+        tuple(reasons), in_hands_kg=max(in_hands_kg, held_kg),
+    )  # fmt: skip
+    return found, wrench
 
 
 class PlateErrors(NamedTuple):

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in_words, out_of_step_in_words
 from dynakin.filter.ground.fine_delay import UNKNOWN_S, clock_delay
-from dynakin.filter.ground.judged import Ground, judged
+from dynakin.filter.ground.ground import Ground
+from dynakin.filter.ground.judged import judged
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.on_ground import GroundTrial, OnGround
 from dynakin.filter.ground.plate_sum import MASS_APART, Empty, doubtful_mass, mean_load_kg

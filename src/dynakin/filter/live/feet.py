@@ -12,7 +12,8 @@ from dynakin.bindings import _core
 from dynakin.errors import ConfigError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.ground.declared import may_bear
-from dynakin.filter.ground.expected import Bearing, ContactPaths, expected_loads
+from dynakin.filter.ground.expected import ContactPaths, expected_loads
+from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear
 from dynakin.filter.live.closure import DELAY_S, LiveClosure
 from dynakin.filter.live.end_of_range import EndOfRange
@@ -124,7 +125,7 @@ class LiveFeet:
             loads = self._closed(loads, time_s, markers, places, wrenches, bears)
         undeclared = loads.elsewhere & (wrenches is not None)
         self.whole = self._whole(loads, bears)
-        return expected_loads(Bearing(loads, undeclared, bears, shear), self.initial, self.noise, paths)
+        return expected_loads(Ground(loads, undeclared, bears, shear), self.initial, self.noise, paths)
 
     def _whole(self, loads: FootLoads, bears: Flags) -> bool:
         return bool(loads.total_known[0] and not bears.any() and not self._vertical)
