@@ -19,8 +19,7 @@ from dynakin.filter.ground.on_ground import GroundTrial, OnGround
 from dynakin.filter.ground.plate_sum import MASS_APART, Empty, doubtful_mass, mean_load_kg
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.blank import without_blanks
-from dynakin.recordings.feet.zero_offset import without_offsets
+from dynakin.recordings.feet.zero_offset import without_blanks, without_offsets
 from dynakin.recordings.recording import Recording
 from dynakin.units import GRAVITY_M_S2
 

@@ -16,7 +16,6 @@ from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear
 from dynakin.filter.live.closure import DELAY_S, LiveClosure
-from dynakin.filter.live.end_of_range import EndOfRange
 from dynakin.filter.live.owners import PlateOwners
 from dynakin.filter.live.stances import DT_S, LiveStances
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -26,7 +25,7 @@ from dynakin.recordings.feet.contact import (
 from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
 from dynakin.recordings.feet.soles import Soles
-from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.ground_plate import EndOfRange, GroundPlate
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.plates.stuck import STILL_N
 from dynakin.recordings.pushes import JUDGED_N

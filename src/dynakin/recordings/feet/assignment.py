@@ -23,12 +23,11 @@ from dynakin.recordings.feet.contact import GAP_S, NEAR_SUPPORT_M, FootContact, 
 from dynakin.recordings.feet.findings import exchanged, plate_findings
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
 from dynakin.recordings.feet.like_the_other import like_the_other
-from dynakin.recordings.feet.loads import FootLoads, divided
+from dynakin.recordings.feet.loads import FootLoads, divided, plates_bear_all
 from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.feet.turned_moments import turned_moments
 from dynakin.recordings.feet.who_stands_where import WhoStandsWhere
-from dynakin.recordings.feet.whole_load import plates_bear_all
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, GroundPlate
 from dynakin.recordings.pushes import JUDGED_N
