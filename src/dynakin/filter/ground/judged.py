@@ -36,7 +36,6 @@ from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
-from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.pushes import LOADED_N
 from dynakin.settings.contacts import SEAT
@@ -92,7 +91,7 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
     carries = judged_by_motion(on, wrenches, trial.tolerance)
     carries = carries._replace(bears=carries.bears | (on.may & plates.borne))
     if loads is not None and on.unmeasured:
-        loads, low = low_beside_feet(recording, initial, loads, on.places, carries.bears, on.unmeasured)
+        loads, low = low_beside_feet(initial, recording.time, loads, on.places, carries.bears, on.unmeasured)
         carries = carries._replace(bears=carries.bears | low)
     notes += [*check.messages, *([warning("plates", f"{turned}.")] if turned else []), *carries.notes]
     in_hands_kg = 0.0 if loads is None else more_than_the_mass(initial, carries.load_ratio)
@@ -198,7 +197,7 @@ def _gains(on: OnGround, loads: FootLoads, free: Flags, first: Carried | None) -
     gains = found_gains(needed, plates, wrenches, loads.total_known)
     if not gains.notes or first is None or first.found is None or free[loads.total_known].all():
         return gains
-    off = [GroundPlate.of(plates[p], on.trial.initial.ground) for p in np.flatnonzero(gains.off)]
+    off = [loads.plates[p] for p in np.flatnonzero(gains.off)]
     during = np.asarray(first.bears.any(axis=1))
     near = max(acts_at(first.found, during & own.loaded, own.cop, on.places) for own in off)
     if near < AT_PLATE:

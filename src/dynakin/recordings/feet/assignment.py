@@ -153,10 +153,10 @@ class _Assignment:
         for k, foot in enumerate(feet):
             if foot in contacts:
                 self.unseen(k, contacts[foot])
-        swapped = exchanged([contacts.get(foot) for foot in feet], plates)
+        self.swapped = exchanged([contacts.get(foot) for foot in feet], plates)
         for p, plate in enumerate(plates):
             self.doubtful(p, plate)
-            if any(p in pair for pair in swapped):
+            if any(p in pair for pair in self.swapped):
                 self.on[:, :, p] = False
             if p in self.given:
                 self.on[:, :, p] = False
@@ -365,10 +365,7 @@ class _Assignment:
             self.hidden,
         )  # fmt: skip
         reasons, said = who.reasons(), who.said()
-        own = [p for p in range(len(self.plates)) if p not in self.given]
-        said += plate_findings(
-            self.recording.time, self.feet, contacts, [self.plates[p] for p in own], soles, self.on[:, :, own]
-        )
+        said += plate_findings(who, soles, self.swapped)
         for p, plate in enumerate(self.plates):
             beyond = self.sharing.beyond[:, p] & (self.on[:, :, p].sum(axis=1) > 1)
             if beyond.any() and plate.name not in self.fixed:
@@ -381,5 +378,6 @@ class _Assignment:
                     f"No markers of the {' and '.join(missing)} foot: nobody sees whether it stands off the plates.",
                 )
             )
-        turned = turned_moments(contacts, [self.plates[p] for p in own], self.recording.rate)
+        own = [plate for p, plate in enumerate(self.plates) if p not in self.given]
+        turned = turned_moments(contacts, own, self.recording.rate)
         return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons), turned_moments=turned)

@@ -56,6 +56,7 @@ class FootLoads:
             share it.
         others: declared contact -> (T, 6) wrench of the plates that were given to it, as ``wrench``; of one that it
             shares an equal part.
+        plates: P, in the ground frame, by which it was made.
         messages: sentences with times. reasons: those of them that say why something is not measured.
         turned_moments: why the plates' moments cannot be what the file says; "" where nothing speaks against them.
     """
@@ -71,6 +72,7 @@ class FootLoads:
     on: Flags
     given: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     others: Mapping[str, Array] = field(default_factory=dict)
+    plates: tuple[GroundPlate, ...] = ()
     messages: tuple[Message, ...] = ()
     reasons: tuple[Message, ...] = ()
     turned_moments: str = ""
@@ -195,6 +197,7 @@ def divided(
         on,
         given,
         others,
+        tuple(plates),
     )
     return loads.with_undeclared(elsewhere) if elsewhere.any() else loads
 

@@ -66,9 +66,7 @@ class _Pressed:
         """None where it has no corners, or nobody touches it."""
         if plate.corners is None or not feet:
             return None
-        middle, along = plate.corners.mean(axis=0), plate.corners[0] - plate.corners[1]
-        along = along / np.linalg.norm(along)
-        rows = np.array([along, [-along[1], along[0]]])
+        middle, rows = plate.axes
         touching = [foot.touching & (plate.beyond(foot.outline) < OVER_M) & _level(foot, plate) for foot in feet]
         markers = np.concatenate(
             [np.where(on[:, :, None], foot.outline, np.nan) for on, foot in zip(touching, feet, strict=True)], axis=1

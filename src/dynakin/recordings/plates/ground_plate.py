@@ -71,15 +71,30 @@ class GroundPlate:
         """(T,) it is not empty."""
         return np.asarray(self.push > UNLOADED_N)
 
+    @cached_property
+    def axes(self) -> tuple[Array, Array]:
+        """Its middle (2,) m and its own axes (2, 2), rows, X and Z.
+
+        Raises:
+            ValueError: as `beyond`.
+        """
+        corners = self._edges()
+        along = corners[0] - corners[1]
+        along = along / np.linalg.norm(along)
+        return corners.mean(axis=0), np.array([along, [-along[1], along[0]]])
+
     def beyond(self, points: Array) -> Array:
         """How far (T, K) m points (T, K, 2) lie beyond its edges; 0 inside.
 
         Raises:
             ValueError: its edges are not known.
         """
+        return distance_to_hull(points.reshape(-1, 2), self._edges()).reshape(points.shape[:2])
+
+    def _edges(self) -> Array:
         if self.corners is None:
             raise ValueError(f"{self.name}: expected corners")
-        return distance_to_hull(points.reshape(-1, 2), self.corners).reshape(points.shape[:2])
+        return self.corners
 
 
 def surface_height(plate: Plate, ground: GroundFrame) -> float | None:
