@@ -12,7 +12,7 @@ import pytest
 import dynakin
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import DynakinError, RecordingError
-from dynakin.filter.ground.lean import turned_by_lean
+from dynakin.filter.ground.axes import turned_by_lean
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.prepared import Prepared
 from dynakin.recordings.recording import Recording

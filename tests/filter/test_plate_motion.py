@@ -17,8 +17,7 @@ from dynakin.cli.check_rows import model_rows
 from dynakin.errors import RecordingError
 from dynakin.filter.ground import axes
 from dynakin.filter.ground.carried import _taken_up, more_than_the_mass
-from dynakin.filter.ground.coarse_delay import plates_delay
-from dynakin.filter.ground.delay import Delay, brought_into_step
+from dynakin.filter.ground.delay import Delay, brought_into_step, plates_delay
 from dynakin.filter.ground.fine_delay import UNKNOWN_S
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.shear import NO_SHEAR, found_shear

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.filter.ground.axes import turned_axes
-from dynakin.filter.ground.coarse_delay import plates_delay
-from dynakin.filter.ground.delay import Delay
+from dynakin.filter.ground.delay import Delay, plates_delay
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_sum import doubtful_mass
 from dynakin.messages import Message, warning

@@ -17,6 +17,7 @@ from dynakin.arrays import rms_length, runs, widened
 from dynakin.filter.ground.load_ratio import AMPLITUDE, VIGOROUS, load_ratio, window_means
 from dynakin.filter.ground.mass_centre import REACH_S, low_passed
 from dynakin.filter.ground.needed import Needed, smoothed
+from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.resampling import filled
 from dynakin.units import GRAVITY_M_S2
 
@@ -42,6 +43,9 @@ then (40 N of a force of 30 to 40 N), which such a mass is within."""
 _TOO_MUCH, _STEADY, _TOO_MUCH_S = 1.3, 0.3, 0.3
 """A plate whose scale is wrong, or a load that nobody declared: so many times too much, for 80 % of the time within
 30 % of that. A cable or a rail that pulls a person down changes by more (a flywheel from 1.0 to 1.9)."""
+BEYOND_M, BEYOND_S = 0.25, 0.5
+"""How far beyond the markers of both feet, and for how long at least, the motion needs the ground's push to act for
+something else to bear the person: a shoe is 0.05 larger, who lies or is on hands and toes has it 0.5 to 0.9 away."""
 _UNSEEN_S = 0.2
 """Where too few markers are seen for longer than this, the plates' mean has to be near the weight."""
 
@@ -158,6 +162,29 @@ def plates_misfit(needed: Needed, wrench: Array) -> float | None:
     """RMS of the excess, N, over all frames in which the wrench (T, 6) is known; None where nothing can be judged."""
     found = closure(needed, wrench, np.ones(len(wrench), dtype=bool))
     return None if found is None else float(rms_length(found.excess))
+
+
+def beyond_the_feet(needed: Needed) -> Flags:
+    """(T,) frames in which, by the motion of the centre of mass, the ground would have to push beyond the markers of
+    both feet: a person without plates is borne there by a hand, a knee or a seat that nobody declared. None of a body
+    with a foot that nobody sees."""
+    initial, markers = needed.initial, needed.markers
+    beyond = np.zeros(len(markers), dtype=bool)
+    feet = [[m for m, n in enumerate(initial.recorded_markers) if n in own] for own in initial.foot_markers.values()]
+    found = needed.centre if len(feet) > 1 and all(feet) else None
+    if found is None:
+        return beyond
+    soles = markers[:, [m for own in feet for m in own]]
+    upward = found.acceleration[:, 1] + GRAVITY_M_S2
+    floor = float(np.nanmin(soles[..., 1]))
+    lever = (found.path[:, 1] - floor) / upward.clip(1.0)
+    at = found.path[:, [0, 2]] - lever[:, None] * found.acceleration[:, [0, 2]]
+    with np.errstate(invalid="ignore"):
+        far = distance_to_hull(at, soles[:, :, [0, 2]]) > BEYOND_M
+    far &= found.known & (upward > 0.5 * GRAVITY_M_S2) & np.isfinite(soles).all(axis=(1, 2))
+    for first, end in runs(far):
+        beyond[first:end] = end - first >= BEYOND_S * needed.rate
+    return beyond | _as_beside(beyond, found.known, np.ones_like(beyond))
 
 
 def _small_but_lasting(excess: Array, judged: Flags, window: int, least: float) -> Flags:

@@ -1,7 +1,7 @@
 """By how much plates and markers are out of step, to a millisecond or two: what the motion of the whole body needs,
 forces and moments, against what the plates say.
 
-The centre of mass as a mean of markers (`coarse_delay`) finds tens of milliseconds; a few are lost in skin that follows
+The centre of mass as a mean of markers (`delay`) finds tens of milliseconds; a few are lost in skin that follows
 the joints, and a filter takes them up by acceleration. Inverse kinematics frame by frame has neither, and what is not
 known of segments' inertia, which looks like a delay as well, is estimated with it ([derivations](derivations.md),
 section 11).

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.ground.beyond_feet import beyond_in_words, beyond_the_feet
+from dynakin.arrays import runs
 from dynakin.filter.ground.carried import (
     carried_in_hands,
     carried_in_words,
@@ -17,6 +17,7 @@ from dynakin.filter.ground.carried import (
     more_than_the_mass,
     unseen_in_hands,
 )
+from dynakin.filter.ground.closure import beyond_the_feet
 from dynakin.filter.ground.declared import (
     AT_PLATE,
     acts_at,
@@ -38,6 +39,7 @@ from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.pushes import LOADED_N
+from dynakin.recordings.times import spans
 from dynakin.settings.contacts import SEAT
 
 Array = npt.NDArray[np.float64]
@@ -69,9 +71,16 @@ def _without_plates(on: OnGround) -> tuple[Ground, Array]:
     if on.loads is None or initial.contacts:
         return Ground(on.loads, np.zeros(len(wrench), dtype=bool), on.may, notes=(said,), reasons=(said,)), wrench
     beyond = beyond_the_feet(on.trial.needed)
-    texts = (said, *([beyond_in_words(beyond, recording.time)] if beyond.any() else []))
-    loads = on.loads.with_undeclared(beyond)
-    return Ground(loads, beyond, on.may, notes=texts, reasons=texts), wrench
+    texts = [said]
+    if beyond.any():
+        text = (
+            "something that nobody measures bears the person beyond both feet, by the motion, from "
+            f"{spans(recording.time, runs(beyond))} (a hand, a knee, a seat): what it can reach has no moments there. "
+            "Declare it (--contact hand_right, seat or knee=shank_l), or give the forces of all that bears."
+        )
+        texts.append(warning("plates", text))
+    loads, reasons = on.loads.with_undeclared(beyond), tuple(texts)
+    return Ground(loads, beyond, on.may, notes=reasons, reasons=reasons), wrench
 
 
 def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:

@@ -27,7 +27,7 @@ NEAR = 0.05
 SMOOTH_S = 0.05
 """Standard deviation of the Gaussian by which a difference is smoothed: -3 dB at 2.6 Hz."""
 BESIDE_M = 0.03
-"""How far the mean of the pelvis' markers may lie beside its middle: three quarters of `lean.ASIDE` under a centre of
+"""How far the mean of the pelvis' markers may lie beside its middle: three quarters of `axes.ASIDE` under a centre of
 mass 1 m up. Those of one side (0.09 to 0.13 m) make a body lean over that foot as it does over neither."""
 _SHORTEST_S = 0.3
 

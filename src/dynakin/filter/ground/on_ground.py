@@ -11,9 +11,8 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.axes import turned_axes
-from dynakin.filter.ground.coarse_delay import plates_delay
 from dynakin.filter.ground.declared import declared_contacts, plates_of_their_own
-from dynakin.filter.ground.delay import Delay, brought_into_step
+from dynakin.filter.ground.delay import Delay, brought_into_step, plates_delay
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.shear import NO_SHEAR, Shear
 from dynakin.filter.samples import total_wrench
