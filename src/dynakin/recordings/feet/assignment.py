@@ -20,13 +20,12 @@ from dynakin.arrays import runs, widened
 from dynakin.errors import ConfigError
 from dynakin.messages import note
 from dynakin.recordings.feet.contact import GAP_S, NEAR_SUPPORT_M, FootContact, foot_contacts, middle_velocity
-from dynakin.recordings.feet.findings import exchanged, plate_findings
+from dynakin.recordings.feet.findings import exchanged, plate_findings, turned_moments
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
 from dynakin.recordings.feet.like_the_other import like_the_other
 from dynakin.recordings.feet.loads import FootLoads, divided, plates_bear_all
 from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
-from dynakin.recordings.feet.turned_moments import turned_moments
 from dynakin.recordings.feet.who_stands_where import WhoStandsWhere
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, GroundPlate
@@ -378,6 +377,5 @@ class _Assignment:
                     f"No markers of the {' and '.join(missing)} foot: nobody sees whether it stands off the plates.",
                 )
             )
-        own = [plate for p, plate in enumerate(self.plates) if p not in self.given]
-        turned = turned_moments(contacts, own, self.recording.rate)
+        turned = turned_moments(who, self.recording.rate)
         return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons), turned_moments=turned)

@@ -94,15 +94,7 @@ class FootLoads:
         reason = self.reason.copy()
         light = (reason == SWING) | (filled(self.wrench[..., 1]) < LOADED_N)
         reason[frames[:, None] & light & (reason <= SHARED) & ~self.aloft] = UNKNOWN
-        wrench = np.where((reason == UNKNOWN)[..., None], np.nan, self.wrench)
-        return replace(
-            self,
-            wrench=wrench,
-            reason=reason,
-            total_known=self.total_known & ~frames,
-            all_measured=self.all_measured & ~frames,
-            elsewhere=self.elsewhere | frames,
-        )
+        return replace(self.with_borne(frames)._for(reason), elsewhere=self.elsewhere | frames)
 
     def with_borne(self, frames: Flags) -> FootLoads:
         """The same where contacts that are declared bear the person in these frames (T,) in addition to the plates."""
@@ -112,15 +104,10 @@ class FootLoads:
         """The same where these feet (T, F) may reach beyond their plates: what these measure is not all of them."""
         reason = np.where(feet, np.int8(UNKNOWN), self.reason)
         _alone_is_unknown(reason)
-        wrench = np.where((reason == UNKNOWN)[..., None], np.nan, self.wrench)
-        known = ~feet.any(axis=1)
-        return replace(
-            self,
-            wrench=wrench,
-            reason=reason,
-            total_known=self.total_known & known,
-            all_measured=self.all_measured & known,
-        )
+        return self.with_borne(np.asarray(feet.any(axis=1)))._for(reason)
+
+    def _for(self, reason: npt.NDArray[np.int8]) -> FootLoads:
+        return replace(self, wrench=np.where((reason == UNKNOWN)[..., None], np.nan, self.wrench), reason=reason)
 
 
 def _alone_is_unknown(reason: npt.NDArray[np.int8]) -> None:
