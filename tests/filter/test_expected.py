@@ -20,7 +20,7 @@ from dynakin.filter.ground.expected import (
     plate_errors,
 )
 from dynakin.filter.ground.ground import Ground
-from dynakin.filter.ground.shear import Shear
+from dynakin.filter.ground.plate_errors import PlateErrors
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
 from dynakin.recordings.feet.soles import Soles
@@ -243,7 +243,7 @@ def test_a_plate_of_the_vertical_force_alone_leaves_the_rest_to_the_prior() -> N
     place = PRESSURE[0] + [0.02, 0.0, -0.01]
     loads.wrench[t, 0] = plate_wrench(410.0, place, (0.0, 0.0)) - [0.0, 0.0, 0.0, 0.0, 2.0, 0.0]
     n = len(REASONS)
-    bearing = Ground(loads, np.zeros(n, bool), np.zeros((n, 0), bool), Shear(unmeasured=True))
+    bearing = Ground(loads, np.zeros(n, bool), np.zeros((n, 0), bool), PlateErrors(unmeasured=True))
     found = expected_loads(bearing, person(), NOISE, np.tile(ROOT, (n, 1, 1)))
     assert found.contact[t].tolist()[:2] == [UNMEASURED, UNMEASURED]
     prior = foot_prior(loads, 0, WEIGHT, np.tile(ROOT, (n, 1)), np.zeros(n, bool))

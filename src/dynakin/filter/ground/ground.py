@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.ground.shear import NO_SHEAR, Shear
+from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
 from dynakin.messages import Message
 from dynakin.recordings.feet.loads import FootLoads
 
-Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 
@@ -24,8 +23,7 @@ class Ground:
         undeclared: (T,) frames in which something bears or pulls the person that no plate measures (a seat, a rail, a
             cable), wherever it acts: of the moments only those between the plates and the thighs are known.
         bears: (T, C) frames in which each declared contact bears, or may, where no plate measures it.
-        shear: by how much more than usual the plates' horizontal forces may be off.
-        off_gain: (T, F) part of its load by which the plate under each foot may be off; None: nothing contradicts it.
+        errors: by how much more than usual the plates may be off.
         usable: whether the plates are used at all.
         load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
         notes: what there is to say. reasons: those of them that say why something is not measured.
@@ -39,8 +37,7 @@ class Ground:
     loads: FootLoads | None
     undeclared: Flags
     bears: Flags
-    shear: Shear = NO_SHEAR
-    off_gain: Array | None = None
+    errors: PlateErrors = NO_ERRORS
     usable: bool = False
     load_ratio: float | None = None
     notes: tuple[Message, ...] = ()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -25,12 +23,13 @@ from dynakin.filter.ground.declared import (
     low_beside_feet,
     taken_in_words,
 )
-from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
+from dynakin.filter.ground.gain import found_gains
 from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.on_ground import OnGround
+from dynakin.filter.ground.plate_errors import NO_ERRORS, VERTICAL_ONLY, PlateErrors
 from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
-from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear, not_zeroed
+from dynakin.filter.ground.shear import found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
 from dynakin.recordings.checks import PlateCheck
 from dynakin.recordings.feet import loads as on_plates
@@ -88,17 +87,17 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
     recording, initial = trial.recording, trial.initial
     notes = [note("plates", taken_in_words(plate, own)) for plate, own in on.taken.items()]
     wrench = trial.wrench
-    all_of_it, righted, plates = wrench, None, PlateErrors(on.shear)
+    all_of_it, righted, errors = wrench, None, on.errors
     if loads is not None:
         all_of_it = on.all_of_it
         first = judged_by_motion(on, [all_of_it], None) if on.unmeasured else None
-        plates = _plate_errors(on, loads, first)
-        notes += plates.said
-        righted = plates.gains.righted(wrench, trial.wrenches)
+        errors = _plate_errors(on, loads, first)
+        notes += errors.said
+        righted = errors.righted(wrench, trial.wrenches)
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
-    wrenches = [plates.shear.zeroed(each) for each in (all_of_it, righted) if each is not None]
+    wrenches = [errors.zeroed(each) for each in (all_of_it, righted) if each is not None]
     carries = judged_by_motion(on, wrenches, trial.tolerance)
-    carries = carries._replace(bears=carries.bears | (on.may & plates.borne))
+    carries = carries._replace(bears=carries.bears | (on.may & errors.borne))
     if loads is not None and on.unmeasured:
         loads, low = low_beside_feet(initial, recording.time, loads, on.places, carries.bears, on.unmeasured)
         carries = carries._replace(bears=carries.bears | low)
@@ -109,7 +108,7 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
     doubted = doubtful_mass(initial, initial.weighed_kg + in_hands_kg)  # which says it, too
     if in_hands_kg and not about(notes, "carried") and doubted is None:
         notes.append(note("carried", in_hands_in_words(in_hands_kg)))
-    reasons = [*([VERTICAL_ONLY] if plates.shear.unmeasured else []), *carries.reasons]
+    reasons = [*([VERTICAL_ONLY] if errors.unmeasured else []), *carries.reasons]
     reasons += [] if loads is None else [said for said in loads.reasons if said not in carries.reasons]
     undeclared = carries.undeclared
     if loads is not None:
@@ -117,33 +116,17 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
         loads = loads.with_borne(np.asarray(carries.bears.any(axis=1))).with_undeclared(undeclared)
         loads = loads.without(carries.beyond)
         reasons += _light_feet(before, loads, carries.beyond)
-    partly = undeclared if loads is None else ~loads.total_known | plates.shear.unmeasured
+    partly = undeclared if loads is None else ~loads.total_known | errors.unmeasured
     wrench = np.where(partly[:, None], np.nan, wrench)
     used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
     if loads is not None or used < n:
         notes.append(note("plates", f"The total wrench is measured in {used} of {n} frames."))
     notes += reasons
-    off_gain = None if loads is None or not plates.gains.notes else plates.gains.of_feet(loads)
     found = Ground(
-        loads, undeclared, carries.bears, plates.shear, off_gain, used > 0, carries.load_ratio, tuple(notes),
+        loads, undeclared, carries.bears, errors, used > 0, carries.load_ratio, tuple(notes),
         tuple(reasons), in_hands_kg=max(in_hands_kg, held_kg),
     )  # fmt: skip
     return found, wrench
-
-
-class PlateErrors(NamedTuple):
-    """What the motion says of the plates' sensors.
-
-    Attributes:
-        shear: by how much their horizontal forces are off. gains: which of them have another gain.
-        said: what there is to say of it, and of the rate and of what is carried, which look like it.
-        borne: (C,) declared contacts that it is laid to instead; False: none.
-    """
-
-    shear: Shear
-    gains: PlateGains = NO_GAINS
-    said: Sequence[Message] = ()
-    borne: Flags | Literal[False] = False
 
 
 def _plate_errors(on: OnGround, loads: FootLoads, first: Carried | None) -> PlateErrors:
@@ -158,13 +141,13 @@ def _plate_errors(on: OnGround, loads: FootLoads, first: Carried | None) -> Plat
     total = np.where(free[:, None], on.total(loads), np.nan)
     if (found := _rate_or_load(on, total, touched)) is not None:
         return found
-    if on.shear.unmeasured:
-        return PlateErrors(on.shear)
+    if on.errors.unmeasured:
+        return on.errors
     found = _shear(on, loads, first, total, touched)
     if np.any(found.borne):
         return found
     gains = _gains(on, loads, free, first)
-    return PlateErrors(found.shear, gains, [*found.shear.notes, *gains.notes])
+    return replace(found, gain=gains.gain, factor=gains.factor, said=(*found.said, *gains.said))
 
 
 def _rate_or_load(on: OnGround, total: Array, touched: Flags) -> PlateErrors | None:
@@ -174,13 +157,13 @@ def _rate_or_load(on: OnGround, total: Array, touched: Flags) -> PlateErrors | N
     found = fitting_rate(needed, total)
     # a low-pass takes accelerations, too
     if found is not None and not (found[1] > 1.0 and found_low_pass(on.trial.recording)):
-        return PlateErrors(on.shear, said=[warning("rate", wrong_rate_in_words(needed.rate, *found))])
+        return replace(on.errors, said=(warning("rate", wrong_rate_in_words(needed.rate, *found)),))
     if (load_kg := carried_in_hands(needed, total)) is None:
         return None
     if not touched.any():
-        return PlateErrors(on.shear, said=[warning("carried", carried_in_words(load_kg))])
+        return replace(on.errors, said=(warning("carried", carried_in_words(load_kg)),))
     load = f"The plates' force changes as if about {load_kg:.0f} kg were carried in the hands"
-    return PlateErrors(on.shear, said=[note("carried", held_in_words(load, initial, touched))], borne=touched)
+    return replace(on.errors, said=(note("carried", held_in_words(load, initial, touched)),), borne=touched)
 
 
 def _shear(on: OnGround, loads: FootLoads, first: Carried | None, total: Array, touched: Flags) -> PlateErrors:
@@ -189,30 +172,30 @@ def _shear(on: OnGround, loads: FootLoads, first: Carried | None, total: Array, 
     needed = on.trial.needed
     shear = found_shear(needed, total)
     if first is None or first.found is None:
-        return PlateErrors(shear)
+        return shear
     whole = found_shear(needed, on.total(loads))
     near = acts_at(first.found, loads.total_known, pressed_at(on.trial.wrench), on.places, mean=True)
     if any(whole.zero) and near < AT_PLATE:
-        return PlateErrors(whole)  # the plates', whoever is declared
+        return whole  # the plates', whoever is declared
     if not (any(shear.zero) and touched.any()):
-        return PlateErrors(shear)
-    said = [note("zero", held_in_words(not_zeroed(*shear.zero, needed.weight), on.trial.initial, touched))]
-    return PlateErrors(NO_SHEAR if near * AT_PLATE > 1.0 else replace(shear, notes=()), said=said, borne=touched)
+        return shear
+    said = note("zero", held_in_words(not_zeroed(*shear.zero, needed.weight), on.trial.initial, touched))
+    return replace(NO_ERRORS if near * AT_PLATE > 1.0 else shear, said=(said,), borne=touched)
 
 
-def _gains(on: OnGround, loads: FootLoads, free: Flags, first: Carried | None) -> PlateGains:
+def _gains(on: OnGround, loads: FootLoads, free: Flags, first: Carried | None) -> PlateErrors:
     """What is known of them where the declared contacts may bear, too, as far as it acts at the plates."""
     needed, plates, wrenches = on.trial.needed, on.trial.recording.plates, on.trial.wrenches
     gains = found_gains(needed, plates, wrenches, loads.total_known)
-    if not gains.notes or first is None or first.found is None or free[loads.total_known].all():
+    if not gains.said or first is None or first.found is None or free[loads.total_known].all():
         return gains
-    off = [loads.plates[p] for p in np.flatnonzero(gains.off)]
+    off = [loads.plates[p] for p in np.flatnonzero(gains.gain)]
     during = np.asarray(first.bears.any(axis=1))
     near = max(acts_at(first.found, during & own.loaded, own.cop, on.places) for own in off)
     if near < AT_PLATE:
         return gains
     if near * AT_PLATE < 1.0:  # nobody can tell
-        return PlateGains(gains.off, np.ones(len(plates)), tuple(note("gain", each.text) for each in gains.notes))
+        return replace(gains, factor=1.0, said=tuple(note("gain", each.text) for each in gains.said))
     return found_gains(needed, plates, wrenches, loads.total_known & free)
 
 

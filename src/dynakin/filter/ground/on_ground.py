@@ -14,7 +14,7 @@ from dynakin.filter.ground.axes import turned_axes
 from dynakin.filter.ground.declared import declared_contacts, plates_of_their_own
 from dynakin.filter.ground.delay import Delay, brought_into_step, plates_delay
 from dynakin.filter.ground.needed import Needed
-from dynakin.filter.ground.shear import NO_SHEAR, Shear
+from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
 from dynakin.filter.samples import total_wrench
 from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -76,7 +76,7 @@ class OnGround:
         paths: (T, 1 + C, 3) m where the root and the declared contacts are.
         may: (T, C) frames in which each of these may bear. by_plate: (C,) those that a plate measures; taken:
             plates that are theirs though nobody said so.
-        check: of the plates; None without any. shear: what is known of their horizontal forces before they are judged.
+        check: of the plates; None without any. errors: what is known of theirs before they are judged.
     """
 
     trial: GroundTrial
@@ -86,7 +86,7 @@ class OnGround:
     by_plate: list[bool]
     taken: Mapping[str, tuple[str, ...]]
     check: PlateCheck | None = None
-    shear: Shear = NO_SHEAR
+    errors: PlateErrors = NO_ERRORS
 
     @staticmethod
     def of(trial: GroundTrial) -> OnGround:
@@ -118,25 +118,25 @@ class OnGround:
             raise RecordingError(f"{recording.plates_file}: {check.refusal}{why}")
         if check.unused:
             return replace(found, check=check)
-        shear = Shear(unmeasured=True) if vertical_only(recording) else NO_SHEAR
-        if shear.unmeasured and loads is None:
+        errors = PlateErrors(unmeasured=True) if vertical_only(recording) else NO_ERRORS
+        if errors.unmeasured and loads is None:
             raise RecordingError(
                 f"{recording.plates_file}: the plates measure the vertical force only (horizontal forces are 0, or "
                 "follow it), and this model takes all of the force: export the horizontal forces as well"
             )
-        known = None if loads is None or shear.unmeasured else loads.total_known
+        known = None if loads is None or errors.unmeasured else loads.total_known
         if known is not None and (wrong := turned_axes(trial.needed, recording.plates, known)):
             raise RecordingError(f"{recording.plates_file}: {wrong}")
         if turned:  # by the forces as well where the corners are
             raise RecordingError(f"{recording.plates_file}: {turned}")
-        return replace(found, check=check, shear=shear)
+        return replace(found, check=check, errors=errors)
 
     def coarse_delay(self) -> Delay | None:
         """By how much the plates lag, to some milliseconds; None where they are in step, or nothing can be said."""
         if self.loads is None or self.check is None or self.check.unused:
             return None
         needed = self.trial.needed
-        return plates_delay(needed.vertically() if self.shear.unmeasured else needed, self.total(self.loads))
+        return plates_delay(needed.vertically() if self.errors.unmeasured else needed, self.total(self.loads))
 
     @property
     def unmeasured(self) -> list[int]:
@@ -152,7 +152,7 @@ class OnGround:
     def all_of_it(self) -> Array:
         """The total wrench (T, 6), with the motion's horizontal force where plates have none."""
         wrench = self.trial.wrench
-        return self.trial.needed.with_horizontal(wrench) if self.shear.unmeasured else wrench
+        return self.trial.needed.with_horizontal(wrench) if self.errors.unmeasured else wrench
 
     def total(self, loads: FootLoads) -> Array:
         """(T, 3) N of all plates, where that is all that bears the person; NaN elsewhere."""
