@@ -14,7 +14,7 @@ import dynakin
 from dynakin import Estimator, Subject, load_model
 from dynakin.arrays import widened
 from dynakin.filter.contacts import carry
-from dynakin.filter.ground.expected import plate_errors
+from dynakin.filter.ground.expected import plate_covariances
 from dynakin.filter.ground.gain import SENSOR_M, found_gains
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.prepared import Prepared
@@ -169,7 +169,7 @@ def test_what_a_gain_is_off_by_is_all_of_the_load_or_one_sensors() -> None:
     force = np.array([0.0, 800.0, 60.0])
     wrench = np.concatenate([force, np.cross(place, force)])
     there = carry(-place)
-    sd = np.sqrt(np.diag(there @ plate_errors(wrench[None], place[None], off_gain=0.1)[0] @ there.T))
+    sd = np.sqrt(np.diag(there @ plate_covariances(wrench[None], place[None], off_gain=0.1)[0] @ there.T))
     np.testing.assert_allclose(sd[1], 80.0, rtol=0.02)
     np.testing.assert_allclose(sd[3:], 80.0 * SENSOR_M, rtol=0.02)
     np.testing.assert_allclose(sd[[0, 2]], np.hypot(np.hypot(2.0, 4.0), 6.0), rtol=1e-6)

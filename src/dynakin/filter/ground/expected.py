@@ -117,7 +117,7 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
     places = np.where(np.isfinite(places), places, (root * [1.0, 0.0, 1.0])[:, None])
     gains = np.zeros((frames, K))
     gains[:, :F] = plates.gain_of_feet(loads)
-    by_plates = plate_errors(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), plates, gains.reshape(-1))
+    by_plates = plate_covariances(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), plates, gains.reshape(-1))
     errors[:, each, :, each] = by_plates.reshape(frames, K, 6, 6).swapaxes(0, 1)
     for k in range(K):
         off = unmeasured[:, k]
@@ -164,7 +164,9 @@ def residual_sd(noise: Noise, initial: CalibratedModel) -> Array:
     return np.where(size.all(), np.hypot(size, more), size)
 
 
-def plate_errors(wrench: Array, contact: Array, off: PlateErrors = NO_ERRORS, off_gain: Array | float = 0.0) -> Array:
+def plate_covariances(
+    wrench: Array, contact: Array, off: PlateErrors = NO_ERRORS, off_gain: Array | float = 0.0
+) -> Array:
     """Covariances (T, 6, 6) about the ground's origin of what a plate says, (T, 6) about it too: at its centre of
     pressure on the level of the contact (T, 3) m, at that itself where the plate is hardly loaded.
 
@@ -251,7 +253,7 @@ def _divide(
 ) -> None:
     """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
-    plate = plate_errors(wrench[t, feet].sum(axis=0)[None], places[t, feet[:1]], plates, gains[t, feet[:1]])[0]
+    plate = plate_covariances(wrench[t, feet].sum(axis=0)[None], places[t, feet[:1]], plates, gains[t, feet[:1]])[0]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
     root = np.linalg.cholesky(S)
