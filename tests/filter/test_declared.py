@@ -12,6 +12,7 @@ import pytest
 import dynakin
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.ground.closure import Closure, closure
+from dynakin.filter.ground.needed import Needed
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.messages import notes_of, warnings_of
 from dynakin.model.definition import load_model
@@ -129,7 +130,7 @@ def closure_of(recording: dynakin.Recording, model: dynakin.ModelDefinition) -> 
     initial = dynakin.Estimator(model).calibrate(recording)
     markers, wrench = marker_paths(recording, initial, gaps=True), total_wrench(recording, initial, gaps=True)
     loads = foot_loads(recording, initial.ground, initial.foot_markers)
-    found = closure(initial, recording.time, markers, wrench, loads.total_known)
+    found = closure(Needed(initial, recording.time, markers), wrench, loads.total_known)
     assert found is not None
     return found
 

@@ -10,12 +10,14 @@ import pytest
 
 import dynakin
 from dynakin.filter.ground.declared import low_beside_feet, plates_of_their_own
-from dynakin.filter.ground.expected import Bearing, ContactPaths, expected_loads
+from dynakin.filter.ground.expected import ContactPaths, expected_loads
+from dynakin.filter.ground.ground import Ground
 from dynakin.filter.samples import marker_paths
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import ON_PLATE, SHARED_PLATE
 from dynakin.recordings.feet.loads import MEASURED, UNKNOWN, FootLoads
+from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.trial import simulate
@@ -51,12 +53,12 @@ def whose(
     *plates: Plate, paths: np.ndarray | None = None, given: dict[str, str] | None = None
 ) -> dict[str, tuple[str, ...]]:
     squat, initial, own, loads = by_hands()
-    recording = squat.with_plates((*squat.plates, *plates))
+    every = (*loads.plates, *(GroundPlate.of(plate, initial.ground) for plate in plates))
     on = np.concatenate([loads.on, np.repeat(loads.on[:, :, :1], len(plates), axis=2)], axis=2)
     on[:, :, 2:] &= paths is not None  # that a foot is said to stand on, too
     paths = own if paths is None else paths
     may = np.ones((len(paths), 2), dtype=bool)
-    return plates_of_their_own(recording, initial, replace(loads, on=on), paths, may, given or {})
+    return plates_of_their_own(squat, initial, replace(loads, on=on, plates=every), paths, may, given or {})
 
 
 def test_each_declared_contact_has_the_plate_that_presses_under_it() -> None:
@@ -82,7 +84,7 @@ def test_a_shared_plate_measures_the_sum_of_what_is_on_it() -> None:
     assert loads.total_known.all() and loads.sharing == [HANDS]
     nothing = np.zeros(len(paths), dtype=bool)
     bears = np.zeros((len(paths), 2), dtype=bool)
-    found = expected_loads(Bearing(loads, nothing, bears), initial, dynakin.presets.default(), paths)
+    found = expected_loads(Ground(loads, nothing, bears), initial, dynakin.presets.default(), paths)
     assert (found.contact[:, 2:4] == SHARED_PLATE).all() and (found.contact[:, :2] == ON_PLATE).all()
     both = found.wrench[:, 2:4]
     np.testing.assert_allclose(both.sum(axis=1)[:, 1], 150.0, atol=1.0)
@@ -110,12 +112,12 @@ def test_a_declared_hand_low_over_a_foots_plate_may_press_it_too() -> None:
     low = paths[:, 1:].copy()
     low[100:150, 0] = loads.soles.middle[100:150, 0] + np.array([0.0, 0.1, 0.0])
     nothing = np.zeros((len(low), 2), dtype=bool)
-    left, bears = low_beside_feet(squat, initial, loads, low, nothing, [0, 1])
+    left, bears = low_beside_feet(initial, squat.time, loads, low, nothing, [0, 1])
     assert (left.reason[100:150, 0] == UNKNOWN).all() and (left.reason[:, 1] == MEASURED).all()
     assert bears[100:150, 0].all() and bears.sum() == 50
     (said,) = [each.text for each in left.reasons if "is low over" in each.text]
     assert said.startswith("The hand_right is low over plate 1, on which the right foot stands")
     beside = nothing.copy()
     beside[110:120, 0] = True  # the plates lack what it bears: it is beside them
-    assert low_beside_feet(squat, initial, loads, low, beside, [0, 1])[0] is loads
-    assert low_beside_feet(squat, initial, loads, paths[:, 1:], nothing, [0, 1])[0] is loads
+    assert low_beside_feet(initial, squat.time, loads, low, beside, [0, 1])[0] is loads
+    assert low_beside_feet(initial, squat.time, loads, paths[:, 1:], nothing, [0, 1])[0] is loads

@@ -15,12 +15,12 @@ from dynakin.filter.ground.expected import (
     PIVOT_M,
     SHEAR_SD,
     UNDECLARED_SD,
-    Bearing,
     expected_loads,
     foot_prior,
-    plate_errors,
+    plate_covariances,
 )
-from dynakin.filter.ground.shear import Shear
+from dynakin.filter.ground.ground import Ground
+from dynakin.filter.ground.plate_errors import PlateErrors
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
 from dynakin.recordings.feet.soles import Soles
@@ -98,7 +98,7 @@ def expected(loads: FootLoads, undeclared: np.ndarray | None = None, **noise: fl
     n = len(loads.reason)
     asked = np.zeros(n, bool) if undeclared is None else undeclared
     chosen = NOISE.model_copy(update=noise) if noise else NOISE
-    bearing = Bearing(loads, asked, np.zeros((n, 0), bool))
+    bearing = Ground(loads, asked, np.zeros((n, 0), bool))
     return expected_loads(bearing, person(), chosen, np.tile(ROOT, (n, 1, 1)))
 
 
@@ -195,7 +195,7 @@ def test_plates_err_at_their_centre_of_pressure() -> None:
     place = np.array([1.0, 0.4, 0.3])
     there = carry(-place)
     wrench, foot = plate_wrench(800.0, place, (30.0, -50.0)), np.array([0.9, 0.4, 0.2])
-    errors = there @ plate_errors(wrench[None], foot[None])[0] @ there.T
+    errors = there @ plate_covariances(wrench[None], foot[None])[0] @ there.T
     sd = np.sqrt(np.diag(errors))
     np.testing.assert_allclose(sd[:3], np.hypot(2.0, [4.0, 8.0, 4.0]), rtol=1e-6)
     np.testing.assert_allclose(sd[3:], np.hypot(0.5, 1.6), rtol=1e-2)
@@ -204,7 +204,7 @@ def test_plates_err_at_their_centre_of_pressure() -> None:
 def test_a_hardly_loaded_plate_errs_at_the_foot() -> None:
     """Its centre of pressure says nothing: from 3 N and 0.4 N m of noise it would lie anywhere."""
     foot = np.array([10.0, 0.0, -5.0])
-    errors = plate_errors(np.array([[0.5, 3.0, 0.2, 0.1, -0.3, 0.4]]), foot[None])[0]
+    errors = plate_covariances(np.array([[0.5, 3.0, 0.2, 0.1, -0.3, 0.4]]), foot[None])[0]
     there = carry(-foot)
     np.testing.assert_allclose(np.sqrt(np.diag(there @ errors @ there.T))[3:], np.hypot(0.5, 0.04), rtol=1e-6)
 
@@ -222,7 +222,7 @@ def test_the_parts_of_a_shared_plate_are_the_prior_given_their_sum(shared_n: flo
         P[6 * k : 6 * k + 6, 6 * k : 6 * k + 6] = p.spread[t] @ p.spread[t].T
     measured = loads.wrench[t].sum(axis=0)
     H = np.hstack([np.eye(6), np.eye(6)])
-    plate = plate_errors(measured[None], loads.soles.middle[t, :1])[0]
+    plate = plate_covariances(measured[None], loads.soles.middle[t, :1])[0]
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + plate)
     np.testing.assert_allclose(found.wrench[t, :2].ravel(), mean + K @ (measured - H @ mean), rtol=1e-8, atol=1e-6)
     spread = P - K @ H @ P
@@ -243,7 +243,7 @@ def test_a_plate_of_the_vertical_force_alone_leaves_the_rest_to_the_prior() -> N
     place = PRESSURE[0] + [0.02, 0.0, -0.01]
     loads.wrench[t, 0] = plate_wrench(410.0, place, (0.0, 0.0)) - [0.0, 0.0, 0.0, 0.0, 2.0, 0.0]
     n = len(REASONS)
-    bearing = Bearing(loads, np.zeros(n, bool), np.zeros((n, 0), bool), Shear(unmeasured=True))
+    bearing = Ground(loads, np.zeros(n, bool), np.zeros((n, 0), bool), PlateErrors(unmeasured=True))
     found = expected_loads(bearing, person(), NOISE, np.tile(ROOT, (n, 1, 1)))
     assert found.contact[t].tolist()[:2] == [UNMEASURED, UNMEASURED]
     prior = foot_prior(loads, 0, WEIGHT, np.tile(ROOT, (n, 1)), np.zeros(n, bool))
@@ -310,7 +310,7 @@ def test_the_error_of_a_shared_plate_is_that_of_a_plate() -> None:
         sd = np.sqrt(np.diag(R))
         assert np.linalg.eigvalsh(R / np.outer(sd, sd)).min() > -1e-9
         H = np.hstack([np.eye(6), np.eye(6)])
-        plate, of_sum = plate_errors(parts.sum(axis=0)[None], loads.soles.middle[0, :1])[0], H @ R @ H.T
+        plate, of_sum = plate_covariances(parts.sum(axis=0)[None], loads.soles.middle[0, :1])[0], H @ R @ H.T
         size = np.sqrt(np.diag(plate))
         assert (
             np.linalg.eigvalsh((plate - of_sum) / np.outer(size, size)).min() > -1e-9

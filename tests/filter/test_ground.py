@@ -20,7 +20,8 @@ from dynakin.bindings import _core
 from dynakin.cli.prepared import assumed
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.closure import closure
-from dynakin.filter.ground.judged import Ground
+from dynakin.filter.ground.ground import Ground
+from dynakin.filter.ground.needed import Needed
 from dynakin.filter.impossible import impossible
 from dynakin.filter.sight import LiveSight
 from dynakin.filter.sources import ContactSources, with_sources
@@ -81,7 +82,7 @@ def test_plates_that_carry_the_person_are_found_to(model: str, motion: str, seed
     estimator = person(model)
     initial = estimator.start(recording).calibrated
     markers, wrench, ground = estimator.measured(recording, initial)
-    found = closure(initial, recording.time, markers, wrench, np.ones(len(wrench), dtype=bool))
+    found = closure(Needed(initial, recording.time, markers), wrench, np.ones(len(wrench), dtype=bool))
     assert found is not None and not found.undeclared.any() and not ground.undeclared.any()
     assert np.sqrt(np.nanmean(found.excess**2, axis=0)).max() < 0.02 * WEIGHT
     assert found.load_ratio == pytest.approx(1.0, abs=0.02)
@@ -97,10 +98,10 @@ def test_what_cannot_be_judged_beside_unclaimed_frames_is_as_what_is_judged_besi
     rail = (time >= 4.0) & (time < 6.0)
     less = wrench - np.outer(rail, [0.0, 0.1 * WEIGHT, 0.0, 0.0, 0.0, 0.0])
     claimed = (time < 3.8) | rail | (time >= 6.2)
-    found = closure(initial, recording.time, markers, less, claimed)
+    found = closure(Needed(initial, recording.time, markers), less, claimed)
     assert found is not None and (found.undeclared == rail).all()
     short = claimed & (np.mod(time, 1.0) < 0.05)  # too near to unclaimed frames, all of them
-    assert closure(initial, recording.time, markers, wrench, short) is None
+    assert closure(Needed(initial, recording.time, markers), wrench, short) is None
 
 
 @pytest.mark.parametrize(("away_m", "borne"), [(0.0, False), (0.8, True)])
@@ -129,7 +130,7 @@ def test_a_short_break_in_what_pulls_is_none(break_s: float, pulls: int) -> None
     time = recording.time - recording.time[0]
     pulled = (time > 3.0) & (time < 7.0) & ~((time > 5.0) & (time < 5.0 + break_s))
     more = wrench + np.outer(pulled, [0.1 * WEIGHT, 0.0, 0.0, 0.0, 0.0, 0.0])
-    found = closure(initial, recording.time, markers, more, np.ones(len(wrench), dtype=bool))
+    found = closure(Needed(initial, recording.time, markers), more, np.ones(len(wrench), dtype=bool))
     assert found is not None and len(runs(found.undeclared)) == pulls
 
 
@@ -161,12 +162,12 @@ def test_what_a_runner_weighs_is_the_mean_of_what_plates_and_motion_say(
     """By the peaks, of which a low-pass takes a part and to which skin adds one, a right mass was 2 kg too small."""
     markers = running.markers + (1.0 + skin) * running.up[:, None]
     whole = np.ones(len(markers), dtype=bool)
-    found = closure(running.initial, running.time, markers, scale * running.wrench, whole)
+    found = closure(Needed(running.initial, running.time, markers), scale * running.wrench, whole)
     assert found is not None and not found.undeclared.any()
     assert found.load_ratio == pytest.approx(scale, abs=0.008)
     half_second = (running.time > running.time[0] + 5.0) & (running.time < running.time[0] + 5.5)
     less = scale * running.wrench - np.outer(half_second, [0.0, 0.4 * WEIGHT, 0.0, 0.0, 0.0, 0.0])
-    found = closure(running.initial, running.time, markers, less, whole)
+    found = closure(Needed(running.initial, running.time, markers), less, whole)
     assert found is not None and found.undeclared[half_second].mean() > 0.8
 
 
@@ -179,7 +180,7 @@ def test_a_flight_between_stances_off_the_plates_accuses_no_plate(running: Simpl
         off |= np.append([False] * later, beside[:-later])
     wrench = np.where(beside[:, None], 0.0, running.wrench)
     markers = running.markers + running.up[:, None]
-    found = closure(running.initial, running.time, markers, wrench, ~off)
+    found = closure(Needed(running.initial, running.time, markers), wrench, ~off)
     assert found is not None and not found.undeclared.any()
     assert found.load_ratio == pytest.approx(1.0, abs=0.01)
 

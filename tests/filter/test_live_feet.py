@@ -11,7 +11,8 @@ import pytest
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.ground.expected import Bearing, ContactPaths, expected_loads
+from dynakin.filter.ground.expected import ContactPaths, expected_loads
+from dynakin.filter.ground.ground import Ground
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import Sample, marker_paths, total_wrench
 from dynakin.filter.sources import ContactSources
@@ -209,7 +210,7 @@ def _feet(recording: Recording, live: Tracker) -> ContactLoads:
     initial, markers = live.calibrated, marker_paths(recording, live.calibrated)
     loads = foot_loads(recording, initial.ground, initial.foot_markers)
     paths, nothing = ContactPaths.of(initial).at(markers), np.zeros((len(markers), 0), bool)
-    bearing = Bearing(loads, np.zeros(len(markers), bool), nothing)
+    bearing = Ground(loads, np.zeros(len(markers), bool), nothing)
     return expected_loads(bearing, initial, live.noise, paths)
 
 

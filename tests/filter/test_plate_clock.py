@@ -11,6 +11,7 @@ import pytest
 import dynakin
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.filter.ground.fine_delay import MODEL_S, PRIOR_S, clock_delay
+from dynakin.filter.ground.needed import Needed
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.messages import about
@@ -21,7 +22,7 @@ from support.plates import person, prepared, trial
 def delay_of(recording: Recording, ready: Prepared) -> Delay | None:
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     known = np.isfinite(ready.measured.wrench).all(axis=1, keepdims=True)
-    return clock_delay(ready.calibrated, recording.time, markers, np.where(known, wrench, np.nan))
+    return clock_delay(Needed(ready.calibrated, recording.time, markers), np.where(known, wrench, np.nan))
 
 
 @pytest.mark.parametrize("moved_s", [-0.01, -0.004, 0.0, 0.006, 0.012])
@@ -44,10 +45,10 @@ def test_nothing_is_said_where_forces_are_missing_or_frames_are_few() -> None:
     ready, recording = prepared("gait"), trial("gait")
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     held = replace(ready.calibrated, contacts={"seat": "pelvis"})
-    assert clock_delay(held, recording.time, markers, wrench) is None
-    assert clock_delay(ready.calibrated, recording.time, markers, np.full_like(wrench, np.nan)) is None
+    assert clock_delay(Needed(held, recording.time, markers), wrench) is None
+    assert clock_delay(Needed(ready.calibrated, recording.time, markers), np.full_like(wrench, np.nan)) is None
     seldom = slice(None, None, 5)
-    assert clock_delay(ready.calibrated, recording.time[seldom], markers[seldom], wrench[seldom]) is None
+    assert clock_delay(Needed(ready.calibrated, recording.time[seldom], markers[seldom]), wrench[seldom]) is None
 
 
 def test_frames_that_show_too_little_are_left_out_and_the_rest_is_asked() -> None:
@@ -149,7 +150,7 @@ def test_no_drift_is_asked_for_where_a_load_that_moves_looks_like_one() -> None:
     markers, wrench = marker_paths(recording, ready.calibrated), total_wrench(recording, ready.calibrated)
     known = np.where(np.isfinite(ready.measured.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     asked, not_asked = (
-        clock_delay(ready.calibrated, recording.time, markers, known, drifts) for drifts in (True, False)
+        clock_delay(Needed(ready.calibrated, recording.time, markers), known, drifts) for drifts in (True, False)
     )
     assert asked is not None and not_asked is not None and asked.drift > 0.02 and not_asked.drift == 0.0
 
@@ -161,7 +162,7 @@ def test_who_lands_shows_no_few_milliseconds() -> None:
     wrench = np.where(np.isfinite(ready.measured.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     known = np.flatnonzero(np.isfinite(wrench[:, 1]))
     wrench[known[-1], 1] = 2.5 * 70.0 * 9.81
-    assert clock_delay(ready.calibrated, recording.time, markers, wrench) is None
+    assert clock_delay(Needed(ready.calibrated, recording.time, markers), wrench) is None
 
 
 def test_short_gaps_hide_no_delay() -> None:
@@ -173,8 +174,8 @@ def test_short_gaps_hide_no_delay() -> None:
     wrench = np.where(np.isfinite(ready.measured.wrench).all(axis=1, keepdims=True), wrench, np.nan)
     gap = np.isin(np.arange(recording.n_frames) % 60, [40, 41, 42])
     blank = np.where(gap[:, None, None], np.nan, markers), np.where(gap[:, None], np.nan, wrench)
-    found = clock_delay(ready.calibrated, recording.time, *blank)
-    lacking = clock_delay(ready.calibrated, recording.time[~gap], markers[~gap], wrench[~gap])
+    found = clock_delay(Needed(ready.calibrated, recording.time, blank[0]), blank[1])
+    lacking = clock_delay(Needed(ready.calibrated, recording.time[~gap], markers[~gap]), wrench[~gap])
     assert found is not None and lacking is not None
     assert found.delay_s == pytest.approx(whole.delay_s, abs=0.0005)
     assert lacking[:4] == pytest.approx(found[:4], abs=1e-6)

@@ -12,7 +12,8 @@ import pytest
 import dynakin
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import DynakinError, RecordingError
-from dynakin.filter.ground.lean import root_path, turned_by_lean
+from dynakin.filter.ground.axes import turned_by_lean
+from dynakin.filter.ground.needed import Needed
 from dynakin.filter.prepared import Prepared
 from dynakin.recordings.recording import Recording
 from support.plates import person, prepared, trial
@@ -27,6 +28,10 @@ def legs() -> tuple[Recording, Prepared]:
     kept = [k for k, name in enumerate(walk.marker_names) if not any(word in name for word in UPPER)]
     walk = replace(walk, markers=walk.markers[:, kept], marker_names=tuple(walk.marker_names[k] for k in kept))
     return walk, person().prepare(walk)
+
+
+def motion_of(ready: Prepared) -> Needed:
+    return Needed(ready.calibrated, ready.recording.time, ready.measured.markers)
 
 
 def turned(recording: Recording, turn: np.ndarray, which: int | None = None) -> Recording:
@@ -58,8 +63,7 @@ def test_turned_axes_push_a_body_that_passes_over_them_against_its_lean(
     walk, ready = legs
     with pytest.raises(RecordingError, match=r"horizontal force of plate .* does not fit the motion"):
         person().prepare(turned(walk, turn, which))
-    root = root_path(ready.calibrated, ready.measured.markers)
-    found = turned_by_lean(turned(walk, turn, which).plates, ready.calibrated, root, walk.rate) or ""
+    found = turned_by_lean(motion_of(ready), turned(walk, turn, which).plates) or ""
     assert found.startswith("the horizontal force of " + ("plate 2 does" if which else "plate 1, plate 2 and plate 3"))
     assert re.search(said, found)
 
@@ -67,10 +71,7 @@ def test_turned_axes_push_a_body_that_passes_over_them_against_its_lean(
 def test_plates_in_order_follow_it(legs: tuple[Recording, Prepared]) -> None:
     walk, ready = legs
     assert ready.calibrated.unseen_kg > 20.0
-    assert (
-        turned_by_lean(walk.plates, ready.calibrated, root_path(ready.calibrated, ready.measured.markers), walk.rate)
-        is None
-    )
+    assert turned_by_lean(motion_of(ready), walk.plates) is None
 
 
 def test_one_side_of_a_pelvis_shows_no_lean(legs: tuple[Recording, Prepared]) -> None:
@@ -79,16 +80,15 @@ def test_one_side_of_a_pelvis_shows_no_lean(legs: tuple[Recording, Prepared]) ->
     kept = [k for k, name in enumerate(walk.marker_names) if "L" not in name[0] and "ankle_l" not in name]
     right = replace(walk, marker_names=tuple(walk.marker_names[k] for k in kept), markers=walk.markers[:, kept])
     ready = person().prepare(right)
-    assert np.isnan(root_path(ready.calibrated, ready.measured.markers)).all()
+    assert np.isnan(motion_of(ready).root).all()
 
 
 def test_a_squat_shows_nothing_of_it() -> None:
     """Its pelvis goes back and forth behind the feet, and the trunk the other way."""
     squat = trial("squat")
     ready = prepared("squat")
-    root = root_path(ready.calibrated, ready.measured.markers)
     for turn in (np.eye(2), -np.eye(2)):
-        assert turned_by_lean(turned(squat, turn).plates, ready.calibrated, root, squat.rate) is None
+        assert turned_by_lean(motion_of(ready), turned(squat, turn).plates) is None
 
 
 @pytest.mark.parametrize("signs", [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)])

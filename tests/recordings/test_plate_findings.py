@@ -12,9 +12,8 @@ from dynakin import read
 from dynakin.messages import together
 from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.blank import without_blanks
 from dynakin.recordings.feet.loads import SWING, UNKNOWN
-from dynakin.recordings.feet.zero_offset import without_offsets
+from dynakin.recordings.feet.zero_offset import without_blanks, without_offsets
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.plates.stuck import without_frames

@@ -13,8 +13,7 @@ from dynakin.recordings.formats.c3d import read_c3d
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plates import shared_channels
 from dynakin.recordings.plates.dead import without_dead_channels
-from dynakin.recordings.plates.doubles import without_doubles
-from dynakin.recordings.plates.stuck import frozen, vertical_only
+from dynakin.recordings.plates.stuck import frozen, vertical_only, without_doubles
 from dynakin.recordings.recording import Plate, Recording
 from support.made_recordings import write_c3d
 

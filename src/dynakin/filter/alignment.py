@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from dynakin.filter.ground.closure import plates_misfit
 from dynakin.filter.ground.delay import Delay, clock_in_words
+from dynakin.filter.ground.needed import Needed
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note
@@ -53,6 +54,7 @@ def run_in_step(
         tracker: at its start. run: as `Tracker.run_arrays`.
     """
     calibrated = tracker.calibrated
+    needed = Needed(calibrated, measured.time, measured.markers)
     arrays, shift = run(tracker, measured, progress), 0.0
     misfit = None
     for done in range(passes):
@@ -60,9 +62,9 @@ def run_in_step(
         if delay is None or not delay.beyond(LEAST_S, SIGMAS):
             break
         if not done:  # of nearly every run nobody asks
-            misfit = plates_misfit(calibrated, *measured[:3])
+            misfit = plates_misfit(needed, measured.wrench)
         taken = measured.in_step(shift + delay.delay_s)
-        fits = plates_misfit(calibrated, *taken[:3])
+        fits = plates_misfit(needed, taken.wrench)
         if misfit is not None and fits is not None and fits > misfit:
             return InStep(tracker, arrays, shift, [contradicted(shift + delay.delay_s, misfit, fits)])
         shift, misfit = shift + delay.delay_s, fits

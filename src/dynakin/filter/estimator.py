@@ -14,7 +14,7 @@ from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.ground.expected import ContactPaths, expected_loads
-from dynakin.filter.ground.judged import Ground
+from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.known import known_ground
 from dynakin.filter.ground.place import off_place
 from dynakin.filter.measurements import Measurements
@@ -254,8 +254,8 @@ class Estimator:
         contacts = None
         if feet is not None:
             contacts = feet(calibrated)
-        elif (bearing := ground.bearing()) is not None:
-            contacts = expected_loads(bearing, calibrated, self.noise, ContactPaths.of(calibrated).at(markers))
+        elif ground.loads is not None:
+            contacts = expected_loads(ground, calibrated, self.noise, ContactPaths.of(calibrated).at(markers))
         measured = Measurements(recording.time, markers, wrench, contacts)
         return Prepared(recording, tracker, measured, ground, lag_s, tuple(unsmoothed))
 

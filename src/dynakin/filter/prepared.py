@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.ground.carried import says_carried
-from dynakin.filter.ground.judged import Ground
+from dynakin.filter.ground.ground import Ground
 from dynakin.filter.labels import labels
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.sight import hidden_segments

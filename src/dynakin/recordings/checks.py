@@ -223,8 +223,7 @@ def _beside(plate: Plate, ground: GroundFrame, feet: Mapping[str, Array]) -> boo
         return False
     place = ground.points_to_ground(plate.corners)[:, [0, 2]]
     for outline in feet.values():
-        points = outline.reshape(-1, 2)
-        away = distance_to_hull(points, np.broadcast_to(place, (len(points), *place.shape)))
+        away = distance_to_hull(outline.reshape(-1, 2), place)
         if not np.isfinite(away).any() or np.nanmin(away) < NEAR_M:
             return False
     return True
@@ -244,7 +243,7 @@ def _over_the_edge(
             continue
         ends = np.median(middle[seen], axis=0) + np.outer([1.0, -1.0], ahead * loads.soles.half_m[k, 0])
         place = ground.points_to_ground(np.asarray(recording.plates[on[0]].corners))[:, [0, 2]]
-        over = float(distance_to_hull(ends, np.broadcast_to(place, (2, *place.shape))).max())
+        over = float(distance_to_hull(ends, place).max())
         if over > OVER_EDGE_M:
             found = True
             findings.warn(

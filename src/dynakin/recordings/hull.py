@@ -12,12 +12,13 @@ _FRAMES = 4096  # at once: all pairs of corners of an hour take much memory
 
 
 def distance_to_hull(points: Array, outline: Array) -> Array:
-    """Distance (T,) m of points (T, 2) from the convex hull of the corners (T, K, 2), 0 inside, NaN corners
-    left out.
+    """Distance (T,) m of points (T, 2) from the convex hull of the corners (T, K, 2), or (K, 2) all the time, 0 inside,
+    NaN corners left out.
 
     A point outside is as far from the hull as from the nearest of all lines between two corners; it is inside if no
     half of its horizon is without corners. NaN where the point or all corners are missing.
     """
+    outline = np.broadcast_to(outline, (len(points), *outline.shape[-2:]))
     blocks = [slice(first, first + _FRAMES) for first in range(0, max(len(points), 1), _FRAMES)]
     return np.concatenate([_distance(points[block], outline[block]) for block in blocks])
 

@@ -20,8 +20,8 @@ from dynakin.recordings.formats.mot import Table, read_table
 from dynakin.recordings.formats.textfile import first_cell, refuse_export
 from dynakin.recordings.formats.trc import read_trc
 from dynakin.recordings.plates.dead import without_dead_channels
-from dynakin.recordings.plates.doubles import without_doubles
 from dynakin.recordings.plates.pressure import main_axis
+from dynakin.recordings.plates.stuck import without_doubles
 from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions

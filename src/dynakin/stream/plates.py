@@ -1,4 +1,8 @@
-"""Whether a session's plates are used: checked once somebody stands on them, brought into step, or given up."""
+"""Whether a session's plates are used: checked once somebody stands on them, brought into step, or given up.
+
+Are they in step with the markers, and are their axes right? What `filter.ground` asks of a recording is asked of the
+last seconds of a session.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +14,33 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.ground.delay import out_of_step_in_words
+from dynakin.filter.ground.axes import turned_axes
+from dynakin.filter.ground.delay import out_of_step_in_words, plates_delay
+from dynakin.filter.ground.needed import Needed
+from dynakin.filter.ground.plate_sum import doubtful_mass
 from dynakin.messages import Message, about, note, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.orientation import axis_vector
 from dynakin.recordings.plates.stuck import frozen_live_in_words
 from dynakin.stream.fusion import Fused, Fusion
-from dynakin.stream.plate_motion import LivePlateMotion
-from dynakin.stream.start import check_loaded, loaded, recording_of
+from dynakin.stream.start import check_loaded, floor_plate, loaded, recording_of
 
 Array = npt.NDArray[np.float64]
 Say = Callable[[str | Message], None]
 
+WINDOW_S, FIRST_S, RARELY_S = 8.0, 4.0, 60.0
+"""The last seconds are asked, after the first, then half as often each time that a movement shows nothing, at least so
+often: it takes some 40 ms, and neither clocks nor axes change."""
+MOVES = 0.02
+"""Of the weight, standard deviation of the force that a movement needs: standing shows no clock."""
+LEAST_S = 1.0
+"""So much of them must be judged: by half of it a walk in step was 10 ms late."""
+NEARLY_ALL = 0.95
+"""Part of the frames with a load that no plate measures, from which it may be none: what the plates carry is said, too.
+In fewer of them a seat is left, and what they carry is no mass."""
+_STEP_S = 0.0095
+"""No more than some 100 frames a second are kept: forces of the body's mass are below 6 Hz."""
+_REMEDY = "Correct the plates' axes in the capture system"
 _CHECKED_S, _UNLOADED = 1.0, 10  # of standing on the plates, by which they are checked; so often nobody does
 
 
@@ -39,7 +59,10 @@ class LivePlates:
         self.used = True
         self._estimator, self._fusion, self._say = estimator, fusion, say
         self._initial: CalibratedModel | None = None
-        self._motion: LivePlateMotion | None = None
+        self._asks = False  # the motion, which needs feet
+        self._kept: deque[tuple[float, Array, Array, bool, bool]] = deque()  # of late, as `moved` takes it
+        self._asked_s: float | None = None
+        self._every_s = FIRST_S
         self._mass_doubted = False
         self._said_frozen = self._unloaded = 0
         self._unchecked: deque[Fused] | None = None  # of late, while nobody has stood on them
@@ -57,8 +80,9 @@ class LivePlates:
     def begins(self, initial: CalibratedModel) -> None:
         """The estimate begins, or begins anew."""
         self._initial = initial
-        asked = initial.feet and self.there and self.used
-        self._motion = LivePlateMotion(initial, self.names) if asked else None
+        self._asks = bool(initial.feet) and self.there and self.used
+        self._kept.clear()
+        self._asked_s, self._every_s = None, FIRST_S
 
     def checked(self, fused: Fused) -> None:
         """Plates on which nobody stood at the start are checked once somebody has for a second."""
@@ -93,20 +117,56 @@ class LivePlates:
             self._give_up()
 
     def moved(self, time_s: float, markers: Array, wrenches: Array, claimed: bool, whole: bool) -> None:
-        """The next frame, as of `LivePlateMotion.look`: plates out of step are brought into it, of plates with other
-        axes nothing is taken any more, and that they carry another mass is said."""
-        asked = self._motion
-        if asked is None or not asked.look(time_s, markers, wrenches, claimed, whole):
+        """The next frame: plates out of step are brought into it, of plates with other axes nothing is taken any more,
+        and that they carry another mass is said.
+
+        Args:
+            markers: (M, 3) m, of the model, ground frame, NaN missing. wrenches: (P, 6) N and N m, laboratory frame.
+            claimed: whether their sum is all that bears the person, by feet and plates. whole: by the motion as well.
+        """
+        if not self._asks or (self._kept and 0.0 <= time_s - self._kept[-1][0] < _STEP_S):
             return
-        if asked.turned is not None:
-            self._say(warning("plates", f"{asked.turned}. The plates are not used any more."))
+        if self._kept and time_s < self._kept[-1][0]:
+            self._kept.clear()
+        self._kept.append((time_s, markers, wrenches, claimed, whole))
+        while time_s - self._kept[0][0] > WINDOW_S:
+            self._kept.popleft()
+        if self._asked_s is None or time_s < self._asked_s:
+            self._asked_s = time_s
+        if time_s - self._asked_s < self._every_s:
+            return
+        self._asked_s = time_s
+        self._ask()
+
+    def _ask(self) -> None:
+        initial, now_s = self._initial, self._kept[-1][0]
+        assert initial is not None
+        time = np.array([at for at, *_ in self._kept])
+        known, whole = (np.array([one[k] for one in self._kept], dtype=bool) for k in (3, 4))
+        needed = Needed(initial, time, np.stack([one[1] for one in self._kept]))
+        wrenches = np.stack([one[2] for one in self._kept])  # (T, P, 6)
+        total = initial.ground.vectors_to_ground(wrenches[:, :, :3].sum(axis=1))
+        total = np.where(known[:, None], total, np.nan)
+        if not needed.judged_s(total) >= LEAST_S:
+            return
+        judged = needed.judged(total)
+        if needed.force[judged].std(axis=0).max() > MOVES * needed.weight:
+            self._every_s = min(2.0 * self._every_s, RARELY_S)
+        up = axis_vector(initial.ground.vertical)
+        plates = [floor_plate(name, wrenches[:, p], up) for p, name in enumerate(self.names)]
+        if turned := turned_axes(needed, plates, known, _REMEDY):
+            self._say(warning("plates", f"{turned}. The plates are not used any more."))
             self._give_up()
-        elif asked.delay is not None:
-            self._fusion.plates_behind_s += asked.delay.delay_s
-            self._say(f"{out_of_step_in_words(asked.delay)}; from {time_s:.2f} s on they are brought into step.")
-        if asked.mass is not None and not self._mass_doubted:
+        elif delay := plates_delay(needed, total):
+            self._fusion.plates_behind_s += delay.delay_s
+            self._say(f"{out_of_step_in_words(delay)}; from {now_s:.2f} s on they are brought into step.")
+            self._kept.clear()  # of plates as they came until now
+            self._every_s = FIRST_S
+        load_kg = float(total[judged, 1].mean() / needed.force[judged, 1].mean()) * initial.weighed_kg
+        mass = _other_mass(initial, load_kg, float(np.mean(~whole[known])))
+        if mass is not None and not self._mass_doubted:
             self._mass_doubted = True
-            self._say(asked.mass)
+            self._say(mass)
 
     def say_frozen(self) -> None:
         """Name those that have begun to repeat one row."""
@@ -115,4 +175,19 @@ class LivePlates:
             self._say(frozen_live_in_words(name, since_s))
 
     def _give_up(self) -> None:
-        self.used, self._motion = False, None
+        self.used = self._asks = False
+
+
+def _other_mass(initial: CalibratedModel, load_kg: float, foreign: float) -> Message | None:
+    """A sentence where plates carry so much that it is another mass, by the part of the frames in which something else
+    seems to bear the person."""
+    if not foreign:
+        return doubtful_mass(initial, load_kg)
+    if foreign <= NEARLY_ALL:
+        return None
+    return warning(
+        "weight",
+        f"the plates carry {load_kg:.1f} kg where the person weighs {initial.weighed_kg:.1f} kg, all the time: the "
+        "mass or the unit of the forces is wrong, a plate is missing, or something that no plate measures bears or "
+        "pulls the person (a seat, a cable).",
+    )

@@ -40,12 +40,13 @@ _ARMS = ("hand", "forearm", "radius", "ulna")
 """Segments that show where the hands are, the nearest first."""
 
 
-def carried_in_hands(needed: Needed, initial: CalibratedModel, markers: Array, force: Array) -> float | None:
+def carried_in_hands(needed: Needed, force: Array) -> float | None:
     """Mass, kg, that moves with the hands and that the model does not have; None where nothing shows one.
 
     Args:
-        markers: (T, M, 3) m, ground frame. force: (T, 3) N, the sum over the plates, NaN where it is not known.
+        force: (T, 3) N, the sum over the plates, NaN where it is not known.
     """
+    initial, markers = needed.initial, needed.markers
     owners = [marker.segment for marker in initial.spec.markers]
     hands = []
     for side in ("_r", "_l"):

@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from dynakin.arrays import rms_length, runs, widened
 from dynakin.filter.ground.load_ratio import AMPLITUDE, VIGOROUS, load_ratio, window_means
-from dynakin.filter.ground.mass_centre import REACH_S, low_passed, mass_centre
-from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.filter.ground.mass_centre import REACH_S, low_passed
+from dynakin.filter.ground.needed import Needed, smoothed
+from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.resampling import filled
-from dynakin.recordings.times import rate_of
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -30,8 +30,6 @@ EXCESS = 0.2
 EDGE = 0.06
 """Once it is there, it lasts as long as this part is missing, but no longer than `SPREAD_S` more at either end."""
 SPREAD_S = 0.3
-SMOOTH_S = 0.05
-"""Standard deviation of the Gaussian by which the difference is smoothed: -3 dB at 2.6 Hz."""
 LASTING, LASTING_S = 0.05, 1.0
 """Less is enough where its mean over a second is: a hand on a rail. Well measured recordings stay below 0.025, a run at
 5 m/s below 0.04, simulated ones below 0.01; a rail that bears a tenth makes 0.06 to 0.09."""
@@ -45,6 +43,9 @@ then (40 N of a force of 30 to 40 N), which such a mass is within."""
 _TOO_MUCH, _STEADY, _TOO_MUCH_S = 1.3, 0.3, 0.3
 """A plate whose scale is wrong, or a load that nobody declared: so many times too much, for 80 % of the time within
 30 % of that. A cable or a rail that pulls a person down changes by more (a flywheel from 1.0 to 1.9)."""
+BEYOND_M, BEYOND_S = 0.25, 0.5
+"""How far beyond the markers of both feet, and for how long at least, the motion needs the ground's push to act for
+something else to bear the person: a shoe is 0.05 larger, who lies or is on hands and toes has it 0.5 to 0.9 away."""
 _UNSEEN_S = 0.2
 """Where too few markers are seen for longer than this, the plates' mean has to be near the weight."""
 
@@ -84,18 +85,12 @@ class Closure:
 
 
 def closure(
-    initial: CalibratedModel,
-    time: Array,
-    markers: Array,
-    wrench: Array,
-    claimed: Flags,
-    may_bear: Flags | None = None,
-    may_pull: Flags | None = None,
+    needed: Needed, wrench: Array, claimed: Flags, may_bear: Flags | None = None, may_pull: Flags | None = None
 ) -> Closure | None:
     """Compare the plates' sum with the motion of the centre of mass.
 
     Args:
-        markers: (T, M, 3) m, ground frame, NaN missing. wrench: (T, 6), the sum over the plates.
+        wrench: (T, 6), the sum over the plates.
         claimed: (T,) frames in which that sum is thought to be all that bears the person; only they are judged.
         may_bear, may_pull: (T,) frames in which some declared contact without a plate may push the person up, or down;
             not given: none is declared.
@@ -104,17 +99,16 @@ def closure(
         None where nothing can be judged.
     """
     claimed = claimed & np.isfinite(wrench).all(axis=1)
-    found = mass_centre(initial, time, markers) if claimed.any() else None
+    found = needed.centre if claimed.any() else None
     if found is None:
         return None
-    centre, acceleration, rate = found.path, found.acceleration, rate_of(time)
+    initial, rate, weight = needed.initial, needed.rate, needed.weight
+    centre, acceleration, need = found.path, found.acceleration, needed.force
     judged = found.known & ~widened(~claimed, round(REACH_S * rate))
     if not judged.any():
         return None
     have = low_passed(filled(wrench, np.asarray(~np.isfinite(wrench).all(axis=1))), rate)
     axes = np.array(initial.spec.wrench_measured[:3])
-    weight = initial.weighed_kg * GRAVITY_M_S2
-    need = found.needed_force(initial.weighed_kg)
     vigorous = bool(need[judged, 1].max() > VIGOROUS * weight)
     weighed = (have[:, 1], judged) if vigorous else (wrench[:, 1], found.known & claimed)
     amplitude = AMPLITUDE if vigorous else 0.0
@@ -123,7 +117,7 @@ def closure(
     declared = may_bear if ratio is None or ratio < 1.0 else may_pull
     steady = ratio is not None and declared is not None and _all_the_time(ratio, judged, declared, rate)
     ratio = 1.0 if steady else ratio
-    need *= 1.0 if ratio is None else ratio  # a mass that is somewhat wrong is no contact
+    need = need * (1.0 if ratio is None else ratio)  # a mass that is somewhat wrong is no contact
     missing = np.where(axes, need - have[:, :3], 0.0)
     excess = smoothed(missing, judged, rate)
     zmp = centre - centre[:, [1]] * acceleration / (acceleration[:, [1]] + GRAVITY_M_S2).clip(1.0)
@@ -164,10 +158,33 @@ def _too_much(need: Array, have: Array, judged: Flags, weight: float, rate: floa
     return float(middle) if middle > _TOO_MUCH and high - low < _STEADY * middle else None
 
 
-def plates_misfit(initial: CalibratedModel, time: Array, markers: Array, wrench: Array) -> float | None:
+def plates_misfit(needed: Needed, wrench: Array) -> float | None:
     """RMS of the excess, N, over all frames in which the wrench (T, 6) is known; None where nothing can be judged."""
-    found = closure(initial, time, markers, wrench, np.ones(len(time), dtype=bool))
+    found = closure(needed, wrench, np.ones(len(wrench), dtype=bool))
     return None if found is None else float(rms_length(found.excess))
+
+
+def beyond_the_feet(needed: Needed) -> Flags:
+    """(T,) frames in which, by the motion of the centre of mass, the ground would have to push beyond the markers of
+    both feet: a person without plates is borne there by a hand, a knee or a seat that nobody declared. None of a body
+    with a foot that nobody sees."""
+    initial, markers = needed.initial, needed.markers
+    beyond = np.zeros(len(markers), dtype=bool)
+    feet = [[m for m, n in enumerate(initial.recorded_markers) if n in own] for own in initial.foot_markers.values()]
+    found = needed.centre if len(feet) > 1 and all(feet) else None
+    if found is None:
+        return beyond
+    soles = markers[:, [m for own in feet for m in own]]
+    upward = found.acceleration[:, 1] + GRAVITY_M_S2
+    floor = float(np.nanmin(soles[..., 1]))
+    lever = (found.path[:, 1] - floor) / upward.clip(1.0)
+    at = found.path[:, [0, 2]] - lever[:, None] * found.acceleration[:, [0, 2]]
+    with np.errstate(invalid="ignore"):
+        far = distance_to_hull(at, soles[:, :, [0, 2]]) > BEYOND_M
+    far &= found.known & (upward > 0.5 * GRAVITY_M_S2) & np.isfinite(soles).all(axis=(1, 2))
+    for first, end in runs(far):
+        beyond[first:end] = end - first >= BEYOND_S * needed.rate
+    return beyond | _as_beside(beyond, found.known, np.ones_like(beyond))
 
 
 def _small_but_lasting(excess: Array, judged: Flags, window: int, least: float) -> Flags:
@@ -209,13 +226,3 @@ def _as_beside(undeclared: Flags, judged: Flags, claimed: Flags) -> Flags:
         sides = [bool(undeclared[k]) for k in (first - 1, end) if 0 <= k < len(judged) and judged[k]]
         found[first:end] = bool(sides) and all(sides)
     return found
-
-
-def smoothed(values: Array, judged: Flags, rate: float) -> Array:
-    """Gaussian mean (`SMOOTH_S`) of values (T, C) over the judged frames alone; NaN elsewhere."""
-    reach = round(4.0 * SMOOTH_S * rate)
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (SMOOTH_S * rate)) ** 2)
-    weighed = np.column_stack([np.where(judged[:, None], values, 0.0), judged])
-    sums = np.column_stack([np.convolve(column, kernel)[reach : reach + len(judged)] for column in weighed.T])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(judged[:, None], sums[:, :-1] / sums[:, -1:], np.nan)

@@ -71,13 +71,13 @@ def plates_of_their_own(
     names = list(initial.contacts)
     feet = [places for _, places in foot_places(recording, initial.ground, initial.foot_markers).values()]
     pressed = {
-        p: _Pressed.of(GroundPlate.of(plate, initial.ground), paths[:, 1:], may, bool(loads.on[:, :, p].any()), feet)
-        for p, plate in enumerate(recording.plates)
+        p: _Pressed.of(plate, paths[:, 1:], may, bool(loads.on[:, :, p].any()), feet)
+        for p, plate in enumerate(loads.plates)
         if assigned.get(plate.name) not in initial.feet
     }
     found = dict[str, tuple[str, ...]]()
     for p, each in pressed.items():
-        plate = recording.plates[p].name
+        plate = loads.plates[p].name
         if each is None:
             continue
         elsewhere = [other for at, other in pressed.items() if other is not None and at != p]
@@ -139,7 +139,7 @@ class _Pressed:
 
 
 def low_beside_feet(
-    recording: Recording, initial: CalibratedModel, loads: FootLoads, places: Array, bears: Flags, which: list[int]
+    initial: CalibratedModel, time: Array, loads: FootLoads, places: Array, bears: Flags, which: list[int]
 ) -> tuple[FootLoads, Flags]:
     """The same without the feet on whose plate declared hands may press as well, because they are low over it and near
     where it presses, and while they are the plates lack nothing that they bear beside it; and (T, C) when.
@@ -149,8 +149,7 @@ def low_beside_feet(
     """
     feet, found, reasons = np.zeros(loads.on.shape[:2], dtype=bool), np.zeros_like(bears), list[Message]()
     names, segments = list(initial.contacts), list(initial.contacts.values())
-    for p, plate in enumerate(recording.plates):
-        own = GroundPlate.of(plate, initial.ground)
+    for p, own in enumerate(loads.plates):
         for place, c in zip(places.swapaxes(0, 1), which, strict=True):
             if segments[c] not in HANDS:  # a shank is low while its own foot stands
                 continue
@@ -162,8 +161,8 @@ def low_beside_feet(
                         continue
                     feet[first:end, k] = found[first:end, c] = True
                     text = (
-                        f"The {names[c]} is low over {plate.name}, on which the {foot} foot stands, from "
-                        f"{span(recording.time, first, end)}: what each of them bears is not known there."
+                        f"The {names[c]} is low over {own.name}, on which the {foot} foot stands, from "
+                        f"{span(time, first, end)}: what each of them bears is not known there."
                     )
                     reasons.append(note("plates", text))
     return (replace(loads.without(feet), reasons=(*loads.reasons, *reasons)) if reasons else loads), found

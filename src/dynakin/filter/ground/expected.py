@@ -18,7 +18,8 @@ import scipy.linalg
 from dynakin.arrays import filled, mean_seen
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
 from dynakin.filter.ground.gain import SENSOR_M
-from dynakin.filter.ground.shear import NO_SHEAR, Shear
+from dynakin.filter.ground.ground import Ground
+from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
@@ -81,32 +82,16 @@ class Prior(NamedTuple):
     spread: Array
 
 
-class Bearing(NamedTuple):
-    """What bears the person: feet, the C declared contacts, or something else.
-
-    Attributes:
-        loads: of each foot, by the plates.
-        undeclared: (T,) frames in which something else bears the person.
-        bears: (T, C) frames in which a declared contact may bear; where plates measure it, these say.
-        shear: by how much more than usual the plates' horizontal forces may be off.
-        off_gain: (T, F) part of its load by which the plate under each foot may be off; None: none is.
-    """
-
-    loads: FootLoads
-    undeclared: Flags
-    bears: Flags
-    shear: Shear = NO_SHEAR
-    off_gain: Array | None = None
-
-
-def expected_loads(bearing: Bearing, initial: CalibratedModel, noise: Noise, paths: Array) -> ContactLoads:
+def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths: Array) -> ContactLoads:
     """The feet's wrenches, those of the declared contacts and, last, the residual: what neither they nor the model
     explain, on the root.
 
     Args:
+        ground: of a model with feet; declared contacts may bear, and where plates measure them, these say.
         paths: (T, 1 + C, 3) m, where the root is and where the declared contacts act (`ContactPaths`).
     """
-    loads, undeclared, bears, shear, off_gain = bearing
+    assert ground.loads is not None
+    loads, undeclared, bears, plates = ground.loads, ground.undeclared, ground.bears, ground.errors
     weight, root, C = initial.weighed_kg * GRAVITY_M_S2, paths[:, 0], len(initial.contacts)
     feet = _CONTACT[loads.reason]
     frames, F = feet.shape
@@ -122,7 +107,7 @@ def expected_loads(bearing: Bearing, initial: CalibratedModel, noise: Noise, pat
             wrench[:, k] = filled(measured)
     wrench[:, :K][contact == NO_CONTACT] = 0.0
     errors, effects = np.zeros((frames, K + 1, 6, K + 1, 6)), np.zeros((frames, 6, K, 6))
-    partly = (contact == ON_PLATE) & shear.unmeasured  # the rest of such a wrench is as little known as off the plates
+    partly = (contact == ON_PLATE) & plates.unmeasured  # the rest of such a wrench is as little known as off the plates
     contact[partly] = UNMEASURED
     unmeasured = contact == UNMEASURED
     alone = unmeasured.sum(axis=1) == 1
@@ -131,8 +116,8 @@ def expected_loads(bearing: Bearing, initial: CalibratedModel, noise: Noise, pat
     places = np.concatenate([loads.soles.middle, paths[:, 1:]], axis=1)
     places = np.where(np.isfinite(places), places, (root * [1.0, 0.0, 1.0])[:, None])
     gains = np.zeros((frames, K))
-    gains[:, :F] = 0.0 if off_gain is None else off_gain
-    by_plates = plate_errors(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), shear, gains.reshape(-1))
+    gains[:, :F] = plates.gain_of_feet(loads)
+    by_plates = plate_covariances(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), plates, gains.reshape(-1))
     errors[:, each, :, each] = by_plates.reshape(frames, K, 6, 6).swapaxes(0, 1)
     for k in range(K):
         off = unmeasured[:, k]
@@ -155,7 +140,7 @@ def expected_loads(bearing: Bearing, initial: CalibratedModel, noise: Noise, pat
     for group in (range(F), *([F + own.index(name) for name in names] for names in loads.sharing)):
         shares = contact[:, group] == SHARED_PLATE
         for t in np.flatnonzero(shares.any(axis=1)):
-            _divide(int(t), np.asarray(group)[shares[t]], priors, wrench, errors, places, shear, gains)
+            _divide(int(t), np.asarray(group)[shares[t]], priors, wrench, errors, places, plates, gains)
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -179,7 +164,9 @@ def residual_sd(noise: Noise, initial: CalibratedModel) -> Array:
     return np.where(size.all(), np.hypot(size, more), size)
 
 
-def plate_errors(wrench: Array, contact: Array, off: Shear = NO_SHEAR, off_gain: Array | float = 0.0) -> Array:
+def plate_covariances(
+    wrench: Array, contact: Array, off: PlateErrors = NO_ERRORS, off_gain: Array | float = 0.0
+) -> Array:
     """Covariances (T, 6, 6) about the ground's origin of what a plate says, (T, 6) about it too: at its centre of
     pressure on the level of the contact (T, 3) m, at that itself where the plate is hardly loaded.
 
@@ -189,7 +176,7 @@ def plate_errors(wrench: Array, contact: Array, off: Shear = NO_SHEAR, off_gain:
     push, pressure = np.maximum(np.abs(wrench[:, 1]), LOADED_N), contact.copy()
     at = pressed_at(wrench, contact[:, 1])
     pressure[:, [0, 2]] = np.where(np.isnan(at), contact[:, [0, 2]], at)
-    shear = np.hypot(np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), off.sd(wrench))
+    shear = np.hypot(np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), off.shear_sd(wrench))
     shear = np.hypot(shear, off_gain * np.hypot(wrench[:, 0], wrench[:, 2]))
     lift = np.hypot(PLATE_NOISE_N, np.hypot(PLATE_GAIN, off_gain) * push)
     moment = np.hypot(PLATE_NOISE_NM, np.hypot(PLATE_PLACE_M, SENSOR_M * off_gain) * push)
@@ -261,12 +248,12 @@ def _divide(
     wrench: Array,
     errors: Array,
     places: Array,
-    shear: Shear,
+    plates: PlateErrors,
     gains: Array,
 ) -> None:
     """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
-    plate = plate_errors(wrench[t, feet].sum(axis=0)[None], places[t, feet[:1]], shear, gains[t, feet[:1]])[0]
+    plate = plate_covariances(wrench[t, feet].sum(axis=0)[None], places[t, feet[:1]], plates, gains[t, feet[:1]])[0]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
     root = np.linalg.cholesky(S)

@@ -1,7 +1,7 @@
 """By how much plates and markers are out of step, to a millisecond or two: what the motion of the whole body needs,
 forces and moments, against what the plates say.
 
-The centre of mass as a mean of markers (`coarse_delay`) finds tens of milliseconds; a few are lost in skin that follows
+The centre of mass as a mean of markers (`delay`) finds tens of milliseconds; a few are lost in skin that follows
 the joints, and a filter takes them up by acceleration. Inverse kinematics frame by frame has neither, and what is not
 known of segments' inertia, which looks like a delay as well, is estimated with it ([derivations](derivations.md),
 section 11).
@@ -19,6 +19,7 @@ from scipy.linalg import cho_factor, cho_solve
 from dynakin.arrays import runs, wrench_about
 from dynakin.bindings import _core
 from dynakin.filter.ground.delay import Delay
+from dynakin.filter.ground.needed import Needed
 from dynakin.filter.samples import in_step
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.inverse_kinematics import FEWEST_MARKERS, inverse_kinematics
@@ -26,8 +27,7 @@ from dynakin.model.calibration.pose_start import bare
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.resampling import low_pass
-from dynakin.recordings.times import frame_numbers, on_grid, rate_of
-from dynakin.units import GRAVITY_M_S2
+from dynakin.recordings.times import frame_numbers, on_grid
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -92,28 +92,22 @@ DRIFT_LEFT = 1.0
 trials. Who squats with 10 kg in the hands leaves 0.9 and looks like a drift of 0.8 %, so that nobody asks then."""
 
 
-def clock_delay(
-    initial: CalibratedModel,
-    time: Array,
-    markers: Array,
-    wrench: Array,
-    drifts: bool = True,
-    plates: Array | None = None,
-) -> Delay | None:
+def clock_delay(needed: Needed, wrench: Array, drifts: bool = True, plates: Array | None = None) -> Delay | None:
     """The plates' delay; None where nothing can be said. Of a body that is not marked whole by the vertical force.
 
     Args:
-        markers: (T, M, 3) m, of the model, ground frame; NaN: not seen. wrench: (T, 6) N and N m of all plates, about
-            the ground's origin, where that is all that bears the person; NaN elsewhere.
+        wrench: (T, 6) N and N m of all plates, about the ground's origin, where that is all that bears the person; NaN
+            elsewhere.
         drifts: whether the clock may be faster or slower than the markers', or each plate (P, T, 6) may have its own.
     """
-    rate, weight = rate_of(time), initial.weighed_kg * GRAVITY_M_S2
+    initial, rate, weight = needed.initial, needed.rate, needed.weight
     if initial.contacts or not rate >= 4.0 * CUTOFF_HZ:
         return None
     if (wrench[:, 1] > MOST_LOAD * weight).any():
         return None
-    numbers = frame_numbers(time)  # rows that the file lacks are frames without markers
-    time, markers, wrench = _even_time(time, numbers), on_grid(numbers, markers), on_grid(numbers, wrench)
+    numbers = frame_numbers(needed.time)  # rows that the file lacks are frames without markers
+    time, markers = _even_time(needed.time, numbers), on_grid(numbers, needed.markers)
+    wrench = on_grid(numbers, wrench)
     seen = np.isfinite(markers).all(axis=2).sum(axis=1) >= FEWEST_MARKERS
     wrench, led = _led_across(wrench, seen, round(BRIDGED_S * rate))
     shown = np.where((seen | led)[:, None], wrench, np.nan)
@@ -122,7 +116,7 @@ def clock_delay(
         return None
     body, asked = _Body(initial), [UPWARDS] if initial.unseen_kg else list(range(6))
 
-    def moved(parts: list[slice]) -> list[tuple[slice, _Needed]]:
+    def moved(parts: list[slice]) -> list[tuple[slice, _Stretch]]:
         return [(part, body.needed(markers[part], seen[part], rate / part.step, asked)) for part in parts]
 
     judged = moved(stretches)
@@ -148,12 +142,12 @@ def clock_delay(
 
 
 def _drift(
-    time: Array, wrench: Array, judged: list[tuple[slice, _Needed]], noise: Array, prior_sd: Array
+    time: Array, wrench: Array, judged: list[tuple[slice, _Stretch]], noise: Array, prior_sd: Array
 ) -> tuple[Delay | None, float]:
     """A delay that changes evenly with time, None where that is not to be told from one that does not; and its cost.
 
     Args:
-        wrench: (T, 6). prior_sd: of what `_Needed.equations` ask for beside delays.
+        wrench: (T, 6). prior_sd: of what `_Stretch.equations` ask for beside delays.
     """
     known = np.flatnonzero(np.isfinite(wrench).all(axis=1))
     led = np.stack([np.interp(time, time[known], column[known]) for column in wrench.T], axis=1)
@@ -172,7 +166,7 @@ def _drift(
 def _apart(
     time: Array,
     plates: list[Array],
-    judged: list[tuple[slice, _Needed]],
+    judged: list[tuple[slice, _Stretch]],
     noise: Array,
     prior_sd: Array,
     drifting: float,
@@ -226,7 +220,7 @@ class _Step(NamedTuple):
     cost: float
 
 
-class _Needed(NamedTuple):
+class _Stretch(NamedTuple):
     """What a stretch of the motion needs: wrench (T, 6) about the ground's origin, and its derivatives (T, 6, I) by
     inertia; both low-passed; the frames (T,) that count, and which C components are asked."""
 
@@ -277,7 +271,7 @@ class _Body:
         known = [_unsure(np.array(segment.inertia)) for segment in segments if segment.inertia[0] > 0.0]
         self.inertia_sd = np.concatenate(known)
 
-    def needed(self, markers: Array, seen: Flags, rate: float, asked: list[int]) -> _Needed:
+    def needed(self, markers: Array, seen: Flags, rate: float, asked: list[int]) -> _Stretch:
         """Of a stretch of markers (T, M, 3), which show enough in most of its frames (T,)."""
         posed = inverse_kinematics(self._initial, markers[seen])
         q = _through(np.flatnonzero(seen), posed, np.arange(len(markers))) if not seen.all() else posed
@@ -290,7 +284,7 @@ class _Body:
             x[: len(moving)] = moving
             wrench[k] = _core.wrench(self._model, x)
             by_inertia[k] = _core.wrench_jacobian(self._model, x)[:, self._inertia]
-        return _Needed(wrench, by_inertia, seen, rate, asked)
+        return _Stretch(wrench, by_inertia, seen, rate, asked)
 
 
 def _even_time(time: Array, numbers: npt.NDArray[np.intp]) -> Array:
@@ -355,7 +349,9 @@ def _stretches(wrench: Array, rate: float, least_n: float, longest_s: float = LO
     return chosen
 
 
-def _step(judged: list[tuple[slice, _Needed]], plates: Array, noise: Array, prior_sd: Array, lags: list[_Lag]) -> _Step:
+def _step(
+    judged: list[tuple[slice, _Stretch]], plates: Array, noise: Array, prior_sd: Array, lags: list[_Lag]
+) -> _Step:
     """How much more plates (T, 6) are off. By least squares with priors over stretches of the recording, each row of
     which counts as so much of one as its low-pass leaves; what is left that is more than the noise counts as noise."""
     equations = [need.equations(part, plates, noise, lags) for part, need in judged]

@@ -6,17 +6,15 @@ Whatever the person weighs, the same part of each plate's force must be what the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms
-from dynakin.filter.ground.closure import SMOOTH_S, smoothed
-from dynakin.filter.ground.needed import Needed
+from dynakin.filter.ground.needed import SMOOTH_S, Needed, smoothed
+from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
 from dynakin.messages import Message, warning
-from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.recording import Plate
 from dynakin.results.naming import listed
 
@@ -49,37 +47,6 @@ SENSOR_M = 0.25
 """How far from where a foot presses the sensor lies whose gain it may be: plates are 0.4 to 0.6 m long."""
 
 
-@dataclass(frozen=True, eq=False)
-class PlateGains:
-    """Plates that contradict others.
-
-    Attributes:
-        off: (P,) part of its load by which each plate may be off; 0: nothing contradicts it.
-        factor: (P,) what each says over what it should, as far as that is known; 1 of plates of which one is wrong and
-            nobody knows which.
-        notes: what there is to say.
-    """
-
-    off: Array
-    factor: Array
-    notes: tuple[Message, ...] = ()
-
-    def of_feet(self, loads: FootLoads) -> Array:
-        """(T, F) the same of what each foot stands on."""
-        return np.asarray((loads.on * self.off).max(axis=2, initial=0.0))
-
-    def righted(self, total: Array, wrenches: Array) -> Array | None:
-        """The sum (T, 6) of plates (P, T, 6) as it were had each the gain of the others; None where nothing differs, or
-        nobody knows which plate is wrong."""
-        if (self.factor == 1.0).all():
-            return None
-        return np.asarray(total - np.tensordot(1.0 - 1.0 / self.factor, np.nan_to_num(wrenches), axes=1))
-
-
-NO_GAINS = PlateGains(np.zeros(0), np.ones(0))
-"""Nothing is off."""
-
-
 class _Apart(NamedTuple):
     """One plate beside others: log of what it says over what they say, of what the motion needs of each; its standard
     deviation; the part that this explains of what else is left; alike: what is left is as large where it bears as
@@ -92,17 +59,16 @@ class _Apart(NamedTuple):
     alike: bool
 
 
-def found_gains(needed: Needed, plates: Sequence[Plate], wrenches: Array, known: Flags) -> PlateGains:
+def found_gains(needed: Needed, plates: Sequence[Plate], wrenches: Array, known: Flags) -> PlateErrors:
     """What the motion of the centre of mass says of each plate beside the others.
 
     Args:
         wrenches: (P, T, 6) of the plates, ground frame. known: (T,) frames in which their sum is all that bears the
             person.
     """
-    none = PlateGains(np.zeros(len(plates)), np.ones(len(plates)))
     judged = needed.known & known & np.isfinite(wrenches).all(axis=(0, 2))
     if len(plates) < 2 or not judged.any():
-        return none
+        return NO_ERRORS
     push = smoothed(wrenches[:, :, 1].T, judged, needed.rate)[judged] / needed.weight
     need = smoothed(needed.force[:, [1]], judged, needed.rate)[judged, 0] / needed.weight
     bears = push.sum(axis=0) / needed.rate
@@ -112,9 +78,9 @@ def found_gains(needed: Needed, plates: Sequence[Plate], wrenches: Array, known:
         apart = [each for p in asked if (each := _beside(push, need, p, own, rest, needed.rate)) is not None]
         found = max(apart, key=lambda each: abs(each.log) / each.sd, default=None)
         if found is None or abs(found.log) < max(np.log1p(APART), SIGMAS * found.sd):
-            return PlateGains(off, factor, tuple(notes))
+            break
         if found.explained < EXPLAINED or not found.alike:  # something else bears, too, and may be what the others lack
-            return PlateGains(off, factor, tuple(notes))
+            break
         plate, by, only_two = found.plate, float(np.exp(found.log)), len(asked) == 2
         off[asked if only_two else plate] = abs(1.0 - 1.0 / by)
         factor[plate] = 1.0 if only_two else by
@@ -122,7 +88,7 @@ def found_gains(needed: Needed, plates: Sequence[Plate], wrenches: Array, known:
         notes.append(warning("gain", _in_words(plates[plate].name, others, by, found.sd, only_two)))
         own.append(plate)
         rest.remove(plate)
-    return PlateGains(off, factor, tuple(notes))
+    return PlateErrors(gain=off, factor=factor, said=tuple(notes))
 
 
 def _in_words(plate: str, others: str, by: float, sd: float, only_two: bool) -> str:

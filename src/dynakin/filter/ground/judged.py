@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.ground.beyond_feet import beyond_in_words, beyond_the_feet
+from dynakin.arrays import runs
 from dynakin.filter.ground.carried import (
     carried_in_hands,
     carried_in_words,
@@ -17,6 +15,7 @@ from dynakin.filter.ground.carried import (
     more_than_the_mass,
     unseen_in_hands,
 )
+from dynakin.filter.ground.closure import beyond_the_feet
 from dynakin.filter.ground.declared import (
     AT_PLATE,
     acts_at,
@@ -24,68 +23,26 @@ from dynakin.filter.ground.declared import (
     low_beside_feet,
     taken_in_words,
 )
-from dynakin.filter.ground.expected import Bearing
-from dynakin.filter.ground.gain import NO_GAINS, PlateGains, found_gains
-from dynakin.filter.ground.needed import Needed
+from dynakin.filter.ground.gain import found_gains
+from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.on_ground import OnGround
+from dynakin.filter.ground.plate_errors import NO_ERRORS, VERTICAL_ONLY, PlateErrors
 from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
 from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
-from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear, found_shear, not_zeroed
+from dynakin.filter.ground.shear import found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
 from dynakin.recordings.checks import PlateCheck
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.plates.axes import turned_feet
-from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.pushes import LOADED_N
+from dynakin.recordings.times import spans
 from dynakin.settings.contacts import SEAT
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True, eq=False)
-class Ground:
-    """What is known of the ground reaction over a recording.
-
-    Attributes:
-        loads: of each foot; None of a model that stands on its root.
-        undeclared: (T,) frames in which something bears or pulls the person that no plate measures (a seat, a rail, a
-            cable), wherever it acts: of the moments only those between the plates and the thighs are known.
-        bears: (T, C) frames in which each declared contact bears, or may, where no plate measures it.
-        usable: whether the plates are used at all.
-        load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
-        shear: by how much the plates' horizontal forces are off.
-        off_gain: (T, F) part of its load by which the plate under each foot may be off; None: nothing contradicts it.
-        notes: what there is to say. reasons: those of them that say why something is not measured.
-        behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how far they
-            may be out of it still; 0: no farther than usual.
-        in_hands_kg: what the plates carry more than the mass, where that is more than they are usually off by: the
-            hands may hold it.
-        doubt: a sentence where the plates contradict the mass.
-    """
-
-    loads: FootLoads | None
-    undeclared: Flags
-    bears: Flags
-    usable: bool
-    load_ratio: float | None
-    notes: tuple[Message, ...]
-    reasons: tuple[Message, ...]
-    shear: Shear = NO_SHEAR
-    off_gain: Array | None = None
-    behind_s: float = 0.0
-    clock_sd_s: float = 0.0
-    in_hands_kg: float = 0.0
-    doubt: Message | None = None
-
-    def bearing(self) -> Bearing | None:
-        """What bears the person; None of a model that stands on its root."""
-        if self.loads is None:
-            return None
-        return Bearing(self.loads, self.undeclared, self.bears, self.shear, self.off_gain)
 
 
 def judged(on: OnGround) -> tuple[Ground, Array]:
@@ -111,11 +68,18 @@ def _without_plates(on: OnGround) -> tuple[Ground, Array]:
     said, wrench = note("plates", text), on.trial.wrench
     initial, recording = on.trial.initial, on.trial.recording
     if on.loads is None or initial.contacts:
-        return Ground(on.loads, np.zeros(len(wrench), dtype=bool), on.may, False, None, (said,), (said,)), wrench
-    beyond = beyond_the_feet(initial, recording, on.trial.markers)
-    texts = (said, *([beyond_in_words(beyond, recording.time)] if beyond.any() else []))
-    loads = on.loads.with_undeclared(beyond)
-    return Ground(loads, beyond, on.may, False, None, texts, texts), wrench
+        return Ground(on.loads, np.zeros(len(wrench), dtype=bool), on.may, notes=(said,), reasons=(said,)), wrench
+    beyond = beyond_the_feet(on.trial.needed)
+    texts = [said]
+    if beyond.any():
+        text = (
+            "something that nobody measures bears the person beyond both feet, by the motion, from "
+            f"{spans(recording.time, runs(beyond))} (a hand, a knee, a seat): what it can reach has no moments there. "
+            "Declare it (--contact hand_right, seat or knee=shank_l), or give the forces of all that bears."
+        )
+        texts.append(warning("plates", text))
+    loads, reasons = on.loads.with_undeclared(beyond), tuple(texts)
+    return Ground(loads, beyond, on.may, notes=reasons, reasons=reasons), wrench
 
 
 def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
@@ -123,19 +87,19 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
     recording, initial = trial.recording, trial.initial
     notes = [note("plates", taken_in_words(plate, own)) for plate, own in on.taken.items()]
     wrench = trial.wrench
-    all_of_it, righted, plates = wrench, None, PlateErrors(on.shear)
-    if on.needed is not None and loads is not None:
-        all_of_it = on.all_of_it(on.needed)
+    all_of_it, righted, errors = wrench, None, on.errors
+    if loads is not None:
+        all_of_it = on.all_of_it
         first = judged_by_motion(on, [all_of_it], None) if on.unmeasured else None
-        plates = _plate_errors(on, on.needed, loads, first)
-        notes += plates.said
-        righted = plates.gains.righted(wrench, trial.wrenches)
+        errors = _plate_errors(on, loads, first)
+        notes += errors.said
+        righted = errors.righted(wrench, trial.wrenches)
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
-    wrenches = [plates.shear.zeroed(each) for each in (all_of_it, righted) if each is not None]
+    wrenches = [errors.zeroed(each) for each in (all_of_it, righted) if each is not None]
     carries = judged_by_motion(on, wrenches, trial.tolerance)
-    carries = carries._replace(bears=carries.bears | (on.may & plates.borne))
+    carries = carries._replace(bears=carries.bears | (on.may & errors.borne))
     if loads is not None and on.unmeasured:
-        loads, low = low_beside_feet(recording, initial, loads, on.places, carries.bears, on.unmeasured)
+        loads, low = low_beside_feet(initial, recording.time, loads, on.places, carries.bears, on.unmeasured)
         carries = carries._replace(bears=carries.bears | low)
     notes += [*check.messages, *([warning("plates", f"{turned}.")] if turned else []), *carries.notes]
     in_hands_kg = 0.0 if loads is None else more_than_the_mass(initial, carries.load_ratio)
@@ -144,7 +108,7 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
     doubted = doubtful_mass(initial, initial.weighed_kg + in_hands_kg)  # which says it, too
     if in_hands_kg and not about(notes, "carried") and doubted is None:
         notes.append(note("carried", in_hands_in_words(in_hands_kg)))
-    reasons = [*([VERTICAL_ONLY] if plates.shear.unmeasured else []), *carries.reasons]
+    reasons = [*([VERTICAL_ONLY] if errors.unmeasured else []), *carries.reasons]
     reasons += [] if loads is None else [said for said in loads.reasons if said not in carries.reasons]
     undeclared = carries.undeclared
     if loads is not None:
@@ -152,34 +116,20 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
         loads = loads.with_borne(np.asarray(carries.bears.any(axis=1))).with_undeclared(undeclared)
         loads = loads.without(carries.beyond)
         reasons += _light_feet(before, loads, carries.beyond)
-    partly = undeclared if loads is None else ~loads.total_known | plates.shear.unmeasured
+    partly = undeclared if loads is None else ~loads.total_known | errors.unmeasured
     wrench = np.where(partly[:, None], np.nan, wrench)
     used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
     if loads is not None or used < n:
         notes.append(note("plates", f"The total wrench is measured in {used} of {n} frames."))
     notes += reasons
-    texts = tuple(notes), tuple(reasons)
-    off_gain = None if loads is None or not plates.gains.notes else plates.gains.of_feet(loads)
-    found = Ground(loads, undeclared, carries.bears, used > 0, carries.load_ratio, *texts, plates.shear, off_gain)
-    return replace(found, in_hands_kg=max(in_hands_kg, held_kg)), wrench
+    found = Ground(
+        loads, undeclared, carries.bears, errors, used > 0, carries.load_ratio, tuple(notes),
+        tuple(reasons), in_hands_kg=max(in_hands_kg, held_kg),
+    )  # fmt: skip
+    return found, wrench
 
 
-class PlateErrors(NamedTuple):
-    """What the motion says of the plates' sensors.
-
-    Attributes:
-        shear: by how much their horizontal forces are off. gains: which of them have another gain.
-        said: what there is to say of it, and of the rate and of what is carried, which look like it.
-        borne: (C,) declared contacts that it is laid to instead; False: none.
-    """
-
-    shear: Shear
-    gains: PlateGains = NO_GAINS
-    said: Sequence[Message] = ()
-    borne: Flags | Literal[False] = False
-
-
-def _plate_errors(on: OnGround, needed: Needed, loads: FootLoads, first: Carried | None) -> PlateErrors:
+def _plate_errors(on: OnGround, loads: FootLoads, first: Carried | None) -> PlateErrors:
     """Where no declared contact may bear that bears at all.
 
     Args:
@@ -188,64 +138,64 @@ def _plate_errors(on: OnGround, needed: Needed, loads: FootLoads, first: Carried
     bears = np.zeros_like(on.may) if first is None else first.bears & loads.total_known[:, None]
     free: Flags = np.asarray(~(on.may & bears.any(axis=0)).any(axis=1))
     touched = np.array([name != SEAT for name in on.trial.initial.contacts], dtype=bool) & on.may[free].any(axis=0)
-    total = np.where(free[:, None], on.total(loads, needed), np.nan)
-    if (found := _rate_or_load(on, needed, total, touched)) is not None:
+    total = np.where(free[:, None], on.total(loads), np.nan)
+    if (found := _rate_or_load(on, total, touched)) is not None:
         return found
-    if on.shear.unmeasured:
-        return PlateErrors(on.shear)
-    found = _shear(on, needed, loads, first, total, touched)
+    if on.errors.unmeasured:
+        return on.errors
+    found = _shear(on, loads, first, total, touched)
     if np.any(found.borne):
         return found
-    gains = _gains(on, needed, loads, free, first)
-    return PlateErrors(found.shear, gains, [*found.shear.notes, *gains.notes])
+    gains = _gains(on, loads, free, first)
+    return replace(found, gain=gains.gain, factor=gains.factor, said=(*found.said, *gains.said))
 
 
-def _rate_or_load(on: OnGround, needed: Needed, total: Array, touched: Flags) -> PlateErrors | None:
+def _rate_or_load(on: OnGround, total: Array, touched: Flags) -> PlateErrors | None:
     """Where the force (T, 3) changes as with another rate of the markers, or a load in the hands, or as what the
     declared contacts ``touched`` (C,) bear: then no more can be said of the plates. None where it does not."""
-    initial, recording = on.trial.initial, on.trial.recording
+    needed, initial = on.trial.needed, on.trial.initial
     found = fitting_rate(needed, total)
-    if found is not None and not (found[1] > 1.0 and found_low_pass(recording)):  # which takes accelerations too
-        return PlateErrors(on.shear, said=[warning("rate", wrong_rate_in_words(needed.rate, *found))])
-    if (load_kg := carried_in_hands(needed, initial, on.trial.markers, total)) is None:
+    # a low-pass takes accelerations, too
+    if found is not None and not (found[1] > 1.0 and found_low_pass(on.trial.recording)):
+        return replace(on.errors, said=(warning("rate", wrong_rate_in_words(needed.rate, *found)),))
+    if (load_kg := carried_in_hands(needed, total)) is None:
         return None
     if not touched.any():
-        return PlateErrors(on.shear, said=[warning("carried", carried_in_words(load_kg))])
+        return replace(on.errors, said=(warning("carried", carried_in_words(load_kg)),))
     load = f"The plates' force changes as if about {load_kg:.0f} kg were carried in the hands"
-    return PlateErrors(on.shear, said=[note("carried", held_in_words(load, initial, touched))], borne=touched)
+    return replace(on.errors, said=(note("carried", held_in_words(load, initial, touched)),), borne=touched)
 
 
-def _shear(
-    on: OnGround, needed: Needed, loads: FootLoads, first: Carried | None, total: Array, touched: Flags
-) -> PlateErrors:
+def _shear(on: OnGround, loads: FootLoads, first: Carried | None, total: Array, touched: Flags) -> PlateErrors:
     """By how much the horizontal forces of the total (T, 3) are off, or the contacts ``touched`` (C,) that it is laid
     to."""
+    needed = on.trial.needed
     shear = found_shear(needed, total)
     if first is None or first.found is None:
-        return PlateErrors(shear)
-    whole = found_shear(needed, on.total(loads, needed))
+        return shear
+    whole = found_shear(needed, on.total(loads))
     near = acts_at(first.found, loads.total_known, pressed_at(on.trial.wrench), on.places, mean=True)
     if any(whole.zero) and near < AT_PLATE:
-        return PlateErrors(whole)  # the plates', whoever is declared
+        return whole  # the plates', whoever is declared
     if not (any(shear.zero) and touched.any()):
-        return PlateErrors(shear)
-    said = [note("zero", held_in_words(not_zeroed(*shear.zero, needed.weight), on.trial.initial, touched))]
-    return PlateErrors(NO_SHEAR if near * AT_PLATE > 1.0 else replace(shear, notes=()), said=said, borne=touched)
+        return shear
+    said = note("zero", held_in_words(not_zeroed(*shear.zero, needed.weight), on.trial.initial, touched))
+    return replace(NO_ERRORS if near * AT_PLATE > 1.0 else shear, said=(said,), borne=touched)
 
 
-def _gains(on: OnGround, needed: Needed, loads: FootLoads, free: Flags, first: Carried | None) -> PlateGains:
+def _gains(on: OnGround, loads: FootLoads, free: Flags, first: Carried | None) -> PlateErrors:
     """What is known of them where the declared contacts may bear, too, as far as it acts at the plates."""
-    plates, wrenches = on.trial.recording.plates, on.trial.wrenches
+    needed, plates, wrenches = on.trial.needed, on.trial.recording.plates, on.trial.wrenches
     gains = found_gains(needed, plates, wrenches, loads.total_known)
-    if not gains.notes or first is None or first.found is None or free[loads.total_known].all():
+    if not gains.said or first is None or first.found is None or free[loads.total_known].all():
         return gains
-    off = [GroundPlate.of(plates[p], on.trial.initial.ground) for p in np.flatnonzero(gains.off)]
+    off = [loads.plates[p] for p in np.flatnonzero(gains.gain)]
     during = np.asarray(first.bears.any(axis=1))
     near = max(acts_at(first.found, during & own.loaded, own.cop, on.places) for own in off)
     if near < AT_PLATE:
         return gains
     if near * AT_PLATE < 1.0:  # nobody can tell
-        return PlateGains(gains.off, np.ones(len(plates)), tuple(note("gain", each.text) for each in gains.notes))
+        return replace(gains, factor=1.0, said=tuple(note("gain", each.text) for each in gains.said))
     return found_gains(needed, plates, wrenches, loads.total_known & free)
 
 

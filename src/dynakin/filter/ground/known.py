@@ -12,13 +12,14 @@ import numpy.typing as npt
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in_words, out_of_step_in_words
 from dynakin.filter.ground.fine_delay import UNKNOWN_S, clock_delay
-from dynakin.filter.ground.judged import Ground, judged
+from dynakin.filter.ground.ground import Ground
+from dynakin.filter.ground.judged import judged
+from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.on_ground import GroundTrial, OnGround
 from dynakin.filter.ground.plate_sum import MASS_APART, Empty, doubtful_mass, mean_load_kg
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.blank import without_blanks
-from dynakin.recordings.feet.zero_offset import without_offsets
+from dynakin.recordings.feet.zero_offset import without_blanks, without_offsets
 from dynakin.recordings.recording import Recording
 from dynakin.units import GRAVITY_M_S2
 
@@ -58,7 +59,7 @@ def known_ground(
     Raises:
         RecordingError: the plates are refused.
     """
-    trial, zeros = _zeroed(GroundTrial(recording, initial, markers, assigned, tolerance))
+    trial, zeros = _zeroed(GroundTrial(recording, Needed(initial, recording.time, markers), assigned, tolerance))
     as_it_is = OnGround.of(trial)
     coarse = as_it_is.coarse_delay()
     on_ground = as_it_is if coarse is None else OnGround.of(trial.in_step(coarse))
@@ -96,7 +97,7 @@ def _in_step(
     whole, fine, left = not initial.unseen_kg, None, None
     for _ in range(ROUNDS):
         plates = on_ground.trial.wrenches
-        left = clock_delay(initial, trial.recording.time, trial.markers, known, not says_carried(ground.notes), plates)
+        left = clock_delay(trial.needed, known, not says_carried(ground.notes), plates)
         if left is None or not left.worth_it(whole or coarse is not None or fine is not None):
             break
         fine = left.after(fine or coarse or IN_STEP)

@@ -7,13 +7,12 @@ Newton's second law in every frame is enough to know (`closure`, `mass_centre`).
 from __future__ import annotations
 
 from copy import copy
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.ground.closure import smoothed
-from dynakin.filter.ground.lean import root_path
-from dynakin.filter.ground.mass_centre import mass_centre
+from dynakin.filter.ground.mass_centre import MassCentre, mass_centre
 from dynakin.filter.sight import owners_of, root_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.times import rate_of
@@ -25,27 +24,58 @@ Flags = npt.NDArray[np.bool_]
 
 NEAR = 0.05
 """Part of the weight within which the force must then be what the motion needs; real recordings 0.007 to 0.04."""
+SMOOTH_S = 0.05
+"""Standard deviation of the Gaussian by which a difference is smoothed: -3 dB at 2.6 Hz."""
+BESIDE_M = 0.03
+"""How far the mean of the pelvis' markers may lie beside its middle: three quarters of `axes.ASIDE` under a centre of
+mass 1 m up. Those of one side (0.09 to 0.13 m) make a body lean over that foot as it does over neither."""
 _SHORTEST_S = 0.3
 
 
 class Needed:
-    """What the motion of the centre of mass needs.
+    """The motion of a recording, or of the last seconds, and what it needs: the evidence that plates are held against.
 
     Attributes:
-        time: (T,) s. rate: Hz. weight: N, with what is carried.
-        force: (T, 3) N, ground axes. known: (T,) frames in which it is, and the pelvis is seen, which carries the rest.
-            whole: all of the body is marked.
-        root: (T, 3) m, `root_path`.
+        initial: the person. time: (T,) s. markers: (T, M, 3) m, ground frame, NaN missing.
+        rate: Hz. weight: N, with what is carried. whole: all of the body is marked.
     """
 
     def __init__(self, initial: CalibratedModel, time: Array, markers: Array) -> None:
-        found = mass_centre(initial, time, markers)
-        self.time, self.rate, self.weight = time, rate_of(time), initial.weighed_kg * GRAVITY_M_S2
-        self.whole, self.root = not initial.unseen_kg, root_path(initial, markers)
-        root, seen = root_of(initial.spec), np.asarray(np.isfinite(markers).any(axis=2))
-        unseen = out_of_sight(seen, owners_of(initial.spec), time, root).get(root, np.False_)
-        self.known: Flags = np.zeros(len(time), dtype=bool) if found is None else found.known & ~unseen
-        self.force = np.zeros((len(time), 3)) if found is None else found.needed_force(initial.weighed_kg)
+        self.initial, self.time, self.markers = initial, time, markers
+        self.rate, self.weight = rate_of(time), initial.weighed_kg * GRAVITY_M_S2
+        self.whole = not initial.unseen_kg
+
+    @cached_property
+    def centre(self) -> MassCentre | None:
+        """The centre of mass; None where no stretch of the markers shows it."""
+        return mass_centre(self.initial, self.time, self.markers)
+
+    @cached_property
+    def force(self) -> Array:
+        """(T, 3) N, ground axes; 0 where there is no centre of mass."""
+        found = self.centre
+        return np.zeros((len(self.time), 3)) if found is None else found.needed_force(self.initial.weighed_kg)
+
+    @cached_property
+    def known(self) -> Flags:
+        """(T,) frames in which that is, and the pelvis is seen, which carries the rest."""
+        if self.centre is None:
+            return np.zeros(len(self.time), dtype=bool)
+        spec, seen = self.initial.spec, np.asarray(np.isfinite(self.markers).any(axis=2))
+        root = root_of(spec)
+        return self.centre.known & ~out_of_sight(seen, owners_of(spec), self.time, root).get(root, np.False_)
+
+    @cached_property
+    def root(self) -> Array:
+        """(T, 3) m, ground frame: mean of the markers on the pelvis; NaN where one of them is missing that most frames
+        show, and throughout where they show one side of it alone."""
+        markers = self.initial.spec.markers
+        on_root = [k for k, marker in enumerate(markers) if marker.segment in self.initial.tree.roots]
+        own, places = self.markers[:, on_root], np.array([markers[k].position for k in on_root]).reshape(-1, 3)
+        often = np.isfinite(own).all(axis=2).mean(axis=0) > 0.5
+        if not often.any() or abs(places[often, 2].mean()) > BESIDE_M:
+            return np.full((len(self.time), 3), np.nan)
+        return np.asarray(own[:, often].mean(axis=1))
 
     def vertically(self) -> Needed:
         """The same, for delays that are judged by the vertical force alone, as of a body whose trunk no marker
@@ -85,3 +115,13 @@ class Needed:
         if not self.judged_s(force) >= _SHORTEST_S:  # a rate that is NaN, too
             return float("inf")
         return float(np.sqrt(np.sum(self.smoothed(self.force - force, force).var(axis=0))))
+
+
+def smoothed(values: Array, judged: Flags, rate: float) -> Array:
+    """Gaussian mean (`SMOOTH_S`) of values (T, C) over the judged frames alone; NaN elsewhere."""
+    reach = round(4.0 * SMOOTH_S * rate)
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (SMOOTH_S * rate)) ** 2)
+    weighed = np.column_stack([np.where(judged[:, None], values, 0.0), judged])
+    sums = np.column_stack([np.convolve(column, kernel)[reach : reach + len(judged)] for column in weighed.T])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(judged[:, None], sums[:, :-1] / sums[:, -1:], np.nan)

@@ -11,11 +11,10 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.axes import turned_axes
-from dynakin.filter.ground.coarse_delay import plates_delay
 from dynakin.filter.ground.declared import declared_contacts, plates_of_their_own
-from dynakin.filter.ground.delay import Delay, brought_into_step
+from dynakin.filter.ground.delay import Delay, brought_into_step, plates_delay
 from dynakin.filter.ground.needed import Needed
-from dynakin.filter.ground.shear import NO_SHEAR, Shear
+from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
 from dynakin.filter.samples import total_wrench
 from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -37,13 +36,17 @@ _CORRECT_MOMENTS = (
 
 @dataclass(frozen=True, eq=False)
 class GroundTrial:
-    """What is judged: markers (T, M, 3) m, of the model, ground frame; assigned, tolerance: as for `known_ground`."""
+    """What is judged: a recording's plates by its motion; assigned, tolerance: as for `known_ground`."""
 
     recording: Recording
-    initial: CalibratedModel
-    markers: Array
+    needed: Needed
     assigned: Mapping[str, str] | None
     tolerance: float | None
+
+    @property
+    def initial(self) -> CalibratedModel:
+        """The person."""
+        return self.needed.initial
 
     @cached_property
     def wrench(self) -> Array:
@@ -73,8 +76,7 @@ class OnGround:
         paths: (T, 1 + C, 3) m where the root and the declared contacts are.
         may: (T, C) frames in which each of these may bear. by_plate: (C,) those that a plate measures; taken:
             plates that are theirs though nobody said so.
-        check: of the plates; None without any. shear: what is known of their horizontal forces before they are judged.
-        needed: what the motion needs; None of a model that stands on its root.
+        check: of the plates; None without any. errors: what is known of theirs before they are judged.
     """
 
     trial: GroundTrial
@@ -83,9 +85,8 @@ class OnGround:
     may: Flags
     by_plate: list[bool]
     taken: Mapping[str, tuple[str, ...]]
-    check: PlateCheck | None
-    shear: Shear
-    needed: Needed | None
+    check: PlateCheck | None = None
+    errors: PlateErrors = NO_ERRORS
 
     @staticmethod
     def of(trial: GroundTrial) -> OnGround:
@@ -96,14 +97,14 @@ class OnGround:
         """
         recording, initial = trial.recording, trial.initial
         loads = _loads_of_feet(trial)
-        paths, may = declared_contacts(initial, trial.markers)
+        paths, may = declared_contacts(initial, trial.needed.markers)
         taken = dict[str, tuple[str, ...]]()
         if loads is not None and initial.contacts and recording.plates:
             taken = plates_of_their_own(recording, initial, loads, paths, may, trial.assigned or {})
             loads = _loads_of_feet(trial, taken) if taken else loads
         by_plate = [loads is not None and name in loads.others for name in initial.contacts]
         may &= ~np.array(by_plate, dtype=bool)
-        found = OnGround(trial, loads, paths, may, by_plate, taken, None, NO_SHEAR, None)
+        found = OnGround(trial, loads, paths, may, by_plate, taken)
         if not recording.plates:
             return found
         # steps off the plates: their mean load is no mass
@@ -117,27 +118,25 @@ class OnGround:
             raise RecordingError(f"{recording.plates_file}: {check.refusal}{why}")
         if check.unused:
             return replace(found, check=check)
-        shear = Shear(unmeasured=True) if vertical_only(recording) else NO_SHEAR
-        if shear.unmeasured and loads is None:
+        errors = PlateErrors(unmeasured=True) if vertical_only(recording) else NO_ERRORS
+        if errors.unmeasured and loads is None:
             raise RecordingError(
                 f"{recording.plates_file}: the plates measure the vertical force only (horizontal forces are 0, or "
                 "follow it), and this model takes all of the force: export the horizontal forces as well"
             )
-        needed = None if loads is None else Needed(initial, recording.time, trial.markers)
-        if needed is not None and loads is not None and not shear.unmeasured:
-            wrong = turned_axes(needed, recording.plates, initial, loads.total_known)
-            if wrong:
-                raise RecordingError(f"{recording.plates_file}: {wrong}")
+        known = None if loads is None or errors.unmeasured else loads.total_known
+        if known is not None and (wrong := turned_axes(trial.needed, recording.plates, known)):
+            raise RecordingError(f"{recording.plates_file}: {wrong}")
         if turned:  # by the forces as well where the corners are
             raise RecordingError(f"{recording.plates_file}: {turned}")
-        return replace(found, check=check, shear=shear, needed=needed)
+        return replace(found, check=check, errors=errors)
 
     def coarse_delay(self) -> Delay | None:
         """By how much the plates lag, to some milliseconds; None where they are in step, or nothing can be said."""
-        if self.needed is None or self.loads is None:
+        if self.loads is None or self.check is None or self.check.unused:
             return None
-        needed = self.needed.vertically() if self.shear.unmeasured else self.needed
-        return plates_delay(needed, self.total(self.loads, self.needed))
+        needed = self.trial.needed
+        return plates_delay(needed.vertically() if self.errors.unmeasured else needed, self.total(self.loads))
 
     @property
     def unmeasured(self) -> list[int]:
@@ -149,14 +148,15 @@ class OnGround:
         """(T, C, 3) m of those."""
         return self.paths[:, [1 + c for c in self.unmeasured]]
 
-    def all_of_it(self, needed: Needed) -> Array:
+    @property
+    def all_of_it(self) -> Array:
         """The total wrench (T, 6), with the motion's horizontal force where plates have none."""
         wrench = self.trial.wrench
-        return needed.with_horizontal(wrench) if self.shear.unmeasured else wrench
+        return self.trial.needed.with_horizontal(wrench) if self.errors.unmeasured else wrench
 
-    def total(self, loads: FootLoads, needed: Needed) -> Array:
+    def total(self, loads: FootLoads) -> Array:
         """(T, 3) N of all plates, where that is all that bears the person; NaN elsewhere."""
-        return np.where(loads.total_known[:, None], self.all_of_it(needed)[:, :3], np.nan)
+        return np.where(loads.total_known[:, None], self.all_of_it[:, :3], np.nan)
 
 
 def _loads_of_feet(trial: GroundTrial, taken: Mapping[str, tuple[str, ...]] | None = None) -> FootLoads | None:

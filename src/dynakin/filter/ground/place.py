@@ -10,7 +10,7 @@ import numpy.typing as npt
 from dynakin.arrays import filled
 from dynakin.bindings import _core
 from dynakin.filter.ground.carried import says_carried
-from dynakin.filter.ground.judged import Ground
+from dynakin.filter.ground.ground import Ground
 from dynakin.filter.uncertainty.mass_centres import unseen_limbs
 from dynakin.messages import Message, about, warning
 from dynakin.model.calibration.calibrated import CalibratedModel

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.filter.ground.closure import Closure, closure
 from dynakin.filter.ground.declared import bearing
+from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.on_ground import OnGround
 from dynakin.filter.ground.shear import not_zeroed
 from dynakin.messages import Message, note, warning
@@ -20,7 +21,7 @@ from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.pushes import LOADED_N
-from dynakin.recordings.recording import Plate, Recording
+from dynakin.recordings.recording import Plate
 from dynakin.recordings.times import spans
 from dynakin.recordings.weight import likely_unit
 from dynakin.results.naming import listed
@@ -65,7 +66,7 @@ def judged_by_motion(on: OnGround, wrenches: list[Array], tolerance: float | Non
         wrenches: (T, 6) of all plates, and, where one is found to have another gain, the same without that.
         tolerance: as of `GroundTrial`; None: nobody asks.
     """
-    recording, initial, markers = on.trial.recording, on.trial.initial, on.trial.markers
+    recording, needed, initial = on.trial.recording, on.trial.needed, on.trial.initial
     loads, may, by_plate, wrench = on.loads, on.may, on.by_plate, wrenches[0]
     n, names, notes, reasons = recording.n_frames, list(initial.contacts), list[Message](), list[Message]()
     measured: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
@@ -82,7 +83,7 @@ def judged_by_motion(on: OnGround, wrenches: list[Array], tolerance: float | Non
     unmeasured = None if all(by_plate) else np.asarray(may.any(axis=1))
     pulling = [k for k, name in enumerate(names) if name != SEAT]
     pulls = None if unmeasured is None else np.asarray(may[:, pulling].any(axis=1))
-    found, *without = [closure(initial, recording.time, markers, each, claimed, unmeasured, pulls) for each in wrenches]
+    found, *without = [closure(needed, each, claimed, unmeasured, pulls) for each in wrenches]
     if found is None:
         flies = loads is not None and bool(loads.aloft.all(axis=1).any())  # which weighs nobody
         foreign = None if flies or names else _foreign_load(on, wrench, claimed, tolerance)
@@ -115,7 +116,7 @@ def judged_by_motion(on: OnGround, wrenches: list[Array], tolerance: float | Non
         )
         reasons.append(note("sum of the plates", words))
     elif found.undeclared.any():
-        text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench, loads)
+        text, beyond = _undeclared_in_words(found, needed, wrench, loads)
         reasons.append(text)
     if found.unjudged > MANY * n:
         notes.append(
@@ -146,19 +147,13 @@ def _declared_in_words(found: Closure, bears: Flags, names: list[str], time: Arr
 
 
 def _undeclared_in_words(
-    found: Closure,
-    recording: Recording,
-    initial: CalibratedModel,
-    markers: Array,
-    wrench: Array,
-    loads: FootLoads | None,
+    found: Closure, needed: Needed, wrench: Array, loads: FootLoads | None
 ) -> tuple[Message, Flags]:
     """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts: what they have
     too much is under a foot that stands alone (a load that somebody carries is between two)."""
-    time, feet = recording.time, initial.foot_markers
+    time, initial, weight, feet = needed.time, needed.initial, needed.weight, needed.initial.foot_markers
     beyond = np.zeros((len(time), len(feet)), dtype=bool)
     judged = np.isfinite(found.excess[:, 1])
-    weight = initial.weighed_kg * GRAVITY_M_S2
     if _nearly_all(found):
         load = float(np.nanmean(wrench[judged, 1])) / GRAVITY_M_S2
         x, up, z = (float(np.nanmean(found.excess[judged, axis])) for axis in range(3))
@@ -195,7 +190,7 @@ def _undeclared_in_words(
             own = [m for m, name in enumerate(initial.recorded_markers) if name in names]
             if not own:
                 continue
-            distance = distance_to_hull(place, markers[first:end][:, own][:, :, [0, 2]])
+            distance = distance_to_hull(place, needed.markers[first:end][:, own][:, :, [0, 2]])
             if np.isfinite(distance).any():
                 away.append(float(np.nanmedian(distance)))
                 under = sizes[-1][0] > 0.0 or (loads is not None and _stands_alone(loads, k, slice(first, end)))

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.filter.ground.needed import Needed
-from dynakin.messages import Message, warning
+from dynakin.filter.ground.plate_errors import PlateErrors
+from dynakin.messages import warning
 
 Array = npt.NDArray[np.float64]
 
@@ -25,45 +24,9 @@ skin is in the motion), which chose, real ones 0.86 to 1.11, other simulated one
 VIGOROUS, FOLLOWS = 0.03, 0.95
 """What it takes to tell it: what the motion needs varies by this part of the weight (standard deviation; squats have
 0.016), and the force follows it (correlation)."""
-ANY_N = 1e4
-"""Deviation, N (N m of the moment about the vertical), of what is not measured: any that a person makes, and little
-enough to be inverted beside a plate's noise."""
 
 
-@dataclass(frozen=True)
-class Shear:
-    """By how much the plates' horizontal forces are off: zero, N, X and Z of the ground, of their sum; off_gain, part
-    of any. unmeasured: no plate measures them, nor the moment about the vertical. notes: what there is to say."""
-
-    zero: tuple[float, float] = (0.0, 0.0)
-    off_gain: float = 0.0
-    unmeasured: bool = False
-    notes: tuple[Message, ...] = ()
-
-    def sd(self, wrench: Array) -> Array:
-        """(T,) N, of each horizontal component of a plate's wrench (T, 6), because any may have all of the zero; 0
-        where nothing bears on it."""
-        if self.unmeasured:
-            return np.full(len(wrench), ANY_N)
-        sd = np.hypot(np.hypot(*self.zero), self.off_gain * np.hypot(wrench[:, 0], wrench[:, 2]))
-        return np.where(wrench[:, 1] > 0.0, sd, 0.0)
-
-    def zeroed(self, wrench: Array) -> Array:
-        """The sum over the plates (T, 6) without its zero."""
-        return np.asarray(wrench - np.array([self.zero[0], 0.0, self.zero[1], 0.0, 0.0, 0.0]))
-
-
-NO_SHEAR = Shear()
-"""Nothing is off."""
-VERTICAL_ONLY = warning(
-    "vertical only",
-    "the plates measure the vertical force only: their horizontal forces are 0 or follow it, whatever the person does. "
-    "Horizontal forces, and moments of the legs that rest on them, are those of the motion and not measured.",
-)
-"""What there is to say of plates with `Shear.unmeasured`."""
-
-
-def found_shear(needed: Needed, force: Array) -> Shear:
+def found_shear(needed: Needed, force: Array) -> PlateErrors:
     """What the motion of the centre of mass says of the plates' sum (T, 3) N, NaN where it is not known."""
     closed = needed.closed(force)
     zero, gain = _zero(needed, force, closed), _gain(needed, closed)
@@ -81,7 +44,7 @@ def found_shear(needed: Needed, force: Array) -> Shear:
         )
         notes.append(warning("gain", text))
     off = (0.0, 0.0) if zero is None else (float(zero[0]), float(zero[1]))
-    return Shear(off, 0.0 if gain is None else abs(1.0 - 1.0 / gain), notes=tuple(notes))
+    return PlateErrors(off, 0.0 if gain is None else abs(1.0 - 1.0 / gain), said=tuple(notes))
 
 
 def not_zeroed(x: float, z: float, weight: float) -> str:

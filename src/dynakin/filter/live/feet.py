@@ -12,10 +12,10 @@ from dynakin.bindings import _core
 from dynakin.errors import ConfigError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.ground.declared import may_bear
-from dynakin.filter.ground.expected import Bearing, ContactPaths, expected_loads
-from dynakin.filter.ground.shear import NO_SHEAR, VERTICAL_ONLY, Shear
+from dynakin.filter.ground.expected import ContactPaths, expected_loads
+from dynakin.filter.ground.ground import Ground
+from dynakin.filter.ground.plate_errors import NO_ERRORS, VERTICAL_ONLY, PlateErrors
 from dynakin.filter.live.closure import DELAY_S, LiveClosure
-from dynakin.filter.live.end_of_range import EndOfRange
 from dynakin.filter.live.owners import PlateOwners
 from dynakin.filter.live.stances import DT_S, LiveStances
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -25,7 +25,7 @@ from dynakin.recordings.feet.contact import (
 from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
 from dynakin.recordings.feet.soles import Soles
-from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.ground_plate import EndOfRange, GroundPlate
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.plates.stuck import STILL_N
 from dynakin.recordings.pushes import JUDGED_N
@@ -118,27 +118,27 @@ class LiveFeet:
         self._highest = max(self._highest, float(paths[0, 0, 1]))
         bears = may_bear(self.initial, paths, self._lowest, self._highest - self._lowest)
         bears &= ~np.array([name in loads.others for name in self.initial.contacts], dtype=bool)
-        shear = self._shear(wrenches)
+        errors = self._errors(wrenches)
         self.claimed, self.seen = self._whole(loads, bears), markers
         if markers is not None and wrenches is not None:
             loads = self._closed(loads, time_s, markers, places, wrenches, bears)
         undeclared = loads.elsewhere & (wrenches is not None)
         self.whole = self._whole(loads, bears)
-        return expected_loads(Bearing(loads, undeclared, bears, shear), self.initial, self.noise, paths)
+        return expected_loads(Ground(loads, undeclared, bears, errors), self.initial, self.noise, paths)
 
     def _whole(self, loads: FootLoads, bears: Flags) -> bool:
         return bool(loads.total_known[0] and not bears.any() and not self._vertical)
 
-    def _shear(self, wrenches: Array | None) -> Shear:
+    def _errors(self, wrenches: Array | None) -> PlateErrors:
         """Whether the plates measure horizontal forces: noise alone shows that they do."""
         if not self._sideways and wrenches is not None:
             force = np.abs(self.initial.ground.wrench_to_ground(wrenches)[:, :3])
             self._sideways = bool((force[:, [0, 2]] > STILL_N * force[:, [1]]).any())
             self._vertical = not self._sideways and bool((force[:, 1] > JUDGED_N).any())
         if not self._vertical:
-            return NO_SHEAR
+            return NO_ERRORS
         self._say(sentence(VERTICAL_ONLY.text))
-        return Shear(unmeasured=True)
+        return PlateErrors(unmeasured=True)
 
     def _closed(
         self, loads: FootLoads, time_s: float, markers: Array, places: Array, wrenches: Array, bears: Flags

@@ -16,9 +16,8 @@ from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.blank import without_blanks
 from dynakin.recordings.feet.loads import FootLoads
-from dynakin.recordings.feet.zero_offset import without_offsets
+from dynakin.recordings.feet.zero_offset import without_blanks, without_offsets
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Recording

@@ -20,15 +20,13 @@ from dynakin.arrays import runs, widened
 from dynakin.errors import ConfigError
 from dynakin.messages import note
 from dynakin.recordings.feet.contact import GAP_S, NEAR_SUPPORT_M, FootContact, foot_contacts, middle_velocity
-from dynakin.recordings.feet.findings import exchanged, plate_findings
+from dynakin.recordings.feet.findings import exchanged, plate_findings, turned_moments
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
 from dynakin.recordings.feet.like_the_other import like_the_other
-from dynakin.recordings.feet.loads import FootLoads, divided
+from dynakin.recordings.feet.loads import FootLoads, divided, plates_bear_all
 from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
-from dynakin.recordings.feet.turned_moments import turned_moments
 from dynakin.recordings.feet.who_stands_where import WhoStandsWhere
-from dynakin.recordings.feet.whole_load import plates_bear_all
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, GroundPlate
 from dynakin.recordings.pushes import JUDGED_N
@@ -154,10 +152,10 @@ class _Assignment:
         for k, foot in enumerate(feet):
             if foot in contacts:
                 self.unseen(k, contacts[foot])
-        swapped = exchanged([contacts.get(foot) for foot in feet], plates)
+        self.swapped = exchanged([contacts.get(foot) for foot in feet], plates)
         for p, plate in enumerate(plates):
             self.doubtful(p, plate)
-            if any(p in pair for pair in swapped):
+            if any(p in pair for pair in self.swapped):
                 self.on[:, :, p] = False
             if p in self.given:
                 self.on[:, :, p] = False
@@ -366,10 +364,7 @@ class _Assignment:
             self.hidden,
         )  # fmt: skip
         reasons, said = who.reasons(), who.said()
-        own = [p for p in range(len(self.plates)) if p not in self.given]
-        said += plate_findings(
-            self.recording.time, self.feet, contacts, [self.plates[p] for p in own], soles, self.on[:, :, own]
-        )
+        said += plate_findings(who, soles, self.swapped)
         for p, plate in enumerate(self.plates):
             beyond = self.sharing.beyond[:, p] & (self.on[:, :, p].sum(axis=1) > 1)
             if beyond.any() and plate.name not in self.fixed:
@@ -382,5 +377,5 @@ class _Assignment:
                     f"No markers of the {' and '.join(missing)} foot: nobody sees whether it stands off the plates.",
                 )
             )
-        turned = turned_moments(contacts, [self.plates[p] for p in own], self.recording.rate)
+        turned = turned_moments(who, self.recording.rate)
         return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons), turned_moments=turned)

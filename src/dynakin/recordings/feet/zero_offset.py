@@ -1,14 +1,15 @@
-"""What a plate reads while nobody is on it: its zero offset, which is no load of the person's.
+"""What a plate has while nobody is on it: its zero offset, which is no load of the person's, or no numbers at all, as
+some programs write an empty one.
 
-It is taken off where the markers show that nobody is on the plate and what it reads stays the same, or drifts: by what
-it reads there, and on straight lines in between. Nothing else then takes it for a load, and no other plate is blamed
-for it.
+An offset is taken off where the markers show that nobody is on the plate and what it reads stays the same, or drifts:
+by what it reads there, and on straight lines in between. Nothing else then takes it for a load, and no other plate is
+blamed for it. What a plate without numbers carries while a foot may be on it is not known.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +17,8 @@ import numpy.typing as npt
 
 from dynakin.arrays import mean_seen, runs
 from dynakin.messages import Message, note, warning
+from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.loads import MEASURED, SHARED, SWING
 from dynakin.recordings.feet.places import filled_by_others, foot_places
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
@@ -42,6 +45,31 @@ NOBODYS = 0.1
 unit (N per kg, % of the weight) all of them may read so little."""
 STEADY = 0.5
 """Part of the time without a foot in which it must be so for it to be an offset."""
+
+
+def without_blanks(
+    recording: Recording, ground: GroundFrame, foot_markers: Mapping[str, Sequence[str]]
+) -> tuple[Recording, list[Message]]:
+    """The recording, itself where nothing is blank, with 0 where a plate has no numbers, and each foot is seen in the
+    air or on another plate."""
+    blank = [~np.isfinite(plate.wrench).all(axis=1) for plate in recording.plates]
+    if not np.any(blank) or not all(foot_markers.values()):
+        return recording, []
+    loads = foot_loads(recording, ground, foot_markers)
+    owned = np.asarray(loads.on.any(axis=1))
+    elsewhere = np.isin(loads.reason, (SWING, MEASURED, SHARED)) | loads.on.any(axis=2)
+    plates, emptied = list(recording.plates), []
+    for p, plate in enumerate(plates):
+        empty = blank[p] & ~owned[:, p] & elsewhere.all(axis=1)
+        if empty.any():
+            given = (plate.force, plate.moment, plate.free_moment)
+            force, moment, free = (np.where(empty[:, None], 0.0, values) for values in given)
+            plates[p] = replace(plate, force=force, moment=moment, free_moment=free)
+            emptied.append(plate.name)
+    if not emptied:
+        return recording, []
+    text = f"{', '.join(emptied)}: no numbers while no foot is near, taken as empty there."
+    return recording.with_plates(tuple(plates)), [note("plates", text)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +173,7 @@ def _clear(plate: GroundPlate, feet: Sequence[Array], nobodys_n: float) -> Flags
         (x0, z0), (x1, z1) = np.percentile(judged, (5.0, 95.0), axis=0)
         place = np.array([[x0, z0], [x1, z0], [x1, z1], [x0, z1]])
     for middle in feet:
-        away = distance_to_hull(middle, np.broadcast_to(place, (len(middle), *place.shape)))
-        clear &= np.nan_to_num(away, nan=0.0) > CLEAR_M
+        clear &= np.nan_to_num(distance_to_hull(middle, place), nan=0.0) > CLEAR_M
     return clear
 
 

@@ -136,5 +136,4 @@ def _somebody_over(markers: Array, corners: Array, normal: Array) -> bool:
     side = corners[0] - corners[1]
     rows = np.array([side, np.cross(normal, side)]) / np.linalg.norm(side)
     place = (corners - corners.mean(axis=0)) @ rows.T
-    away = distance_to_hull(points @ rows.T, np.broadcast_to(place, (len(points), 4, 2)))
-    return bool((away <= 0.0).any())
+    return bool((distance_to_hull(points @ rows.T, place) <= 0.0).any())

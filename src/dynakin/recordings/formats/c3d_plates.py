@@ -27,9 +27,9 @@ from dynakin.recordings.formats.c3d_plate_units import (
     volts,
 )
 from dynakin.recordings.limits import check_wrench
+from dynakin.recordings.plates.axes import pulling, turned_in_words
 from dynakin.recordings.plates.dead import Channels, dead_channels
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
-from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words
 from dynakin.recordings.pushes import JUDGED_N, MOST_OFFSET_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate

@@ -12,8 +12,8 @@ from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, other_unit, parse_column
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.limits import check_wrench
+from dynakin.recordings.plates.axes import pulling, turned_in_words
 from dynakin.recordings.plates.pressure import Surface, main_axis, plate_from_wrench
-from dynakin.recordings.plates.signs import pulling, turned_in_words
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
 from dynakin.recordings.pushes import LOADED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording

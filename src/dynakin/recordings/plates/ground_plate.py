@@ -71,16 +71,30 @@ class GroundPlate:
         """(T,) it is not empty."""
         return np.asarray(self.push > UNLOADED_N)
 
+    @cached_property
+    def axes(self) -> tuple[Array, Array]:
+        """Its middle (2,) m and its own axes (2, 2), rows, X and Z.
+
+        Raises:
+            ValueError: as `beyond`.
+        """
+        corners = self._edges()
+        along = corners[0] - corners[1]
+        along = along / np.linalg.norm(along)
+        return corners.mean(axis=0), np.array([along, [-along[1], along[0]]])
+
     def beyond(self, points: Array) -> Array:
         """How far (T, K) m points (T, K, 2) lie beyond its edges; 0 inside.
 
         Raises:
             ValueError: its edges are not known.
         """
+        return distance_to_hull(points.reshape(-1, 2), self._edges()).reshape(points.shape[:2])
+
+    def _edges(self) -> Array:
         if self.corners is None:
             raise ValueError(f"{self.name}: expected corners")
-        flat = points.reshape(-1, 2)
-        return distance_to_hull(flat, np.broadcast_to(self.corners, (len(flat), 4, 2))).reshape(points.shape[:2])
+        return self.corners
 
 
 def surface_height(plate: Plate, ground: GroundFrame) -> float | None:
@@ -122,3 +136,21 @@ def saturated(push: Array) -> Flags:
         after = push[end] if end < len(push) else top
         found[first:end] = end - first >= FLAT_FRAMES and min(before, after) < 0.99 * top
     return found
+
+
+class EndOfRange:
+    """`saturated` at this moment, by the frames until now."""
+
+    def __init__(self, plates: int) -> None:
+        self._top = np.full(plates, JUDGED_N)
+        self._last, self._before = np.full(plates, np.nan), np.full(plates, np.nan)
+        self._flat = np.zeros(plates, dtype=int)
+
+    def at_end(self, push: Array) -> Flags:
+        """(P,) of the next frame's vertical forces (P,) N."""
+        self._top = np.fmax(self._top, push)
+        flat = (push > self._top * (1.0 - 1e-6)) & (np.abs(push - self._last) <= 1e-6 * self._top)
+        self._before = np.where(flat, self._before, self._last)
+        self._flat = np.where(flat, self._flat + 1, 0)
+        self._last = push.copy()
+        return np.asarray((self._flat >= FLAT_FRAMES - 1) & (self._before < 0.99 * self._top))

@@ -99,7 +99,7 @@ def _distance(plate: Plate, recording: Recording, ground: GroundFrame) -> tuple[
     cop = ground.points_to_ground(plate.cop)[:, [0, 2]]
     if plate.corners is not None:
         corners = ground.points_to_ground(plate.corners)[:, [0, 2]]
-        return distance_to_hull(cop, np.broadcast_to(corners, (len(cop), 4, 2))), BEYOND_EDGES_M, "the plate's edges"
+        return distance_to_hull(cop, corners), BEYOND_EDGES_M, "the plate's edges"
     if not recording.marker_names:
         return np.zeros(len(cop)), FAR_M, ""
     markers = ground.points_to_ground(recording.markers)[..., [0, 2]]

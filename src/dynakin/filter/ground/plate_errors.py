@@ -1,0 +1,73 @@
+"""By how much the sensors of plates are off: one value, of what the motion, or a moment, says of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.messages import Message, warning
+from dynakin.recordings.feet.loads import FootLoads
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+ANY_N = 1e4
+"""Deviation, N (N m of the moment about the vertical), of what is not measured: any that a person makes, and little
+enough to be inverted beside a plate's noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlateErrors:
+    """What is wrong with P plates, as far as something contradicts them.
+
+    Attributes:
+        zero: N, X and Z of the ground, all the time, of their sum. shear: part of any horizontal force.
+        unmeasured: no plate measures horizontal forces, nor the moment about the vertical.
+        gain: (P,) part of its load by which each plate may be off.
+        factor: (P,) what each says over what it should, as far as that is known; 1 of plates of which one is wrong and
+            nobody knows which.
+        said: what there is to say, of what looks like such errors, too.
+        borne: (C,) declared contacts that it is laid to instead.
+    """
+
+    zero: tuple[float, float] = (0.0, 0.0)
+    shear: float = 0.0
+    unmeasured: bool = False
+    gain: Array | float = 0.0
+    factor: Array | float = 1.0
+    said: tuple[Message, ...] = ()
+    borne: Flags | bool = False
+
+    def shear_sd(self, wrench: Array) -> Array:
+        """(T,) N, of each horizontal component of a plate's wrench (T, 6), because any may have all of the zero; 0
+        where nothing bears on it."""
+        if self.unmeasured:
+            return np.full(len(wrench), ANY_N)
+        sd = np.hypot(np.hypot(*self.zero), self.shear * np.hypot(wrench[:, 0], wrench[:, 2]))
+        return np.where(wrench[:, 1] > 0.0, sd, 0.0)
+
+    def gain_of_feet(self, loads: FootLoads) -> Array:
+        """(T, F) part of its load by which what each foot stands on may be off."""
+        return np.asarray((loads.on * self.gain).max(axis=2, initial=0.0))
+
+    def zeroed(self, wrench: Array) -> Array:
+        """The sum over the plates (T, 6) without its zero."""
+        return np.asarray(wrench - np.array([self.zero[0], 0.0, self.zero[1], 0.0, 0.0, 0.0]))
+
+    def righted(self, total: Array, wrenches: Array) -> Array | None:
+        """The sum (T, 6) of plates (P, T, 6) as it were had each the gain of the others; None where nothing differs, or
+        nobody knows which plate is wrong."""
+        if np.all(self.factor == 1.0):
+            return None
+        return np.asarray(total - np.tensordot(1.0 - 1.0 / self.factor, np.nan_to_num(wrenches), axes=1))
+
+
+NO_ERRORS = PlateErrors()
+VERTICAL_ONLY = warning(
+    "vertical only",
+    "the plates measure the vertical force only: their horizontal forces are 0 or follow it, whatever the person does. "
+    "Horizontal forces, and moments of the legs that rest on them, are those of the motion and not measured.",
+)
+"""What there is to say of plates whose horizontal forces are ``unmeasured``."""
