@@ -32,8 +32,8 @@ Kind = Literal[
     "root_tilt",
 ]
 """The centre of a joint with one or two axes (hinge) off where it is on its bones, or with three (ball; the spine's)
-within its parent's sagittal plane and across that; its one axis, two or three turned on both bones; the root's frame
-turned in its bone, about its third axis (tilt) or another."""
+within its parent's sagittal plane and across that; its one axis, two or three turned on both bones, those on the trunk
+(shoulders) counted with those of two; the root's frame turned in its bone, about its third axis (tilt) or another."""
 BALLS: tuple[Kind, ...] = ("ball_centre", "ball_across")
 """Centres of joints with three axes that are not the spine's."""
 OF_ROOT: tuple[Kind, ...] = ("root", "root_tilt")
@@ -205,8 +205,8 @@ def _sources(
             if not planar and floats(segment):
                 jointed = [c for c in children if c.name in joints]
                 kinds: tuple[Kind, ...] = ("root", "root", "root_tilt")
-                turned = [_root_turned(name, R_B, jointed, e) for e in R_B.T]
-                found += [(kind, name, column) for kind, column in zip(kinds, turned, strict=True)]
+                roots = [_root_turned(name, R_B, jointed, e) for e in R_B.T]
+                found += [(kind, name, column) for kind, column in zip(kinds, roots, strict=True)]
             continue
         R_J = orientations[segment.parent] @ segment.rotation
         own = {axis.coordinate for axis in segment.axes if axis.kind == "rotation"}
@@ -219,7 +219,8 @@ def _sources(
             found.append((_centre(axes, k, name in trunks), name, column))
         if not planar:
             both = [_along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e) for e in _AXES]
-            found += [(_TURNED[axes], name, column) for column in both]
+            turned = "pair_axes" if segment.parent in trunks else _TURNED[axes]
+            found += [(turned, name, column) for column in both]
     return found
 
 

@@ -28,8 +28,8 @@ class Sizes:
         ball_centre, ball_across: m, of the centre of one with three (hip) along the first two axes of its parent
             (forwards and up), and along the third (to the side).
         spine_centre: m, of the trunk's on the pelvis along the first two: one joint stands for all of the spine's.
-        hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar) or
-            three.
+        hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar; the
+            three of a shoulder, whose arm shows as little of how it is turned about itself) or three.
         root, root_tilt: rad, of the turn of the pelvis' frame in the pelvis about its first two axes, and about the
             third (to the side).
         roll: m/rad, of how far the centre of a joint moves with its angle (knees'), where the model has that.
