@@ -55,9 +55,11 @@ def by_rate() -> Array:
     )
 
 
-def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS, roll: float | None = None) -> _core.ModelSpec:
+def spec(
+    hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS, roll: float | None = None, power: int = 1
+) -> _core.ModelSpec:
     """Pelvis, thigh and shank; the hip and the knee misplaced on all their bones, the knee's axis turned on both; the
-    knee's centre moves forward by ``roll`` m a radian, where it does."""
+    knee's centre moves forward by ``roll`` m a radian to this ``power``, where it does."""
     names = ["tx", "ty", "tz", "tilt", "list", "rotation", "flexion", "adduction", "turn", "knee"]
     root = [_core.AxisSpec(n, "translation", e) for n, e in zip(names[:3], (X, Y, Z), strict=True)]
     root += [_core.AxisSpec(n, "rotation", e) for n, e in zip(names[3:6], (Z, X, Y), strict=True)]
@@ -67,7 +69,7 @@ def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS, roll: fl
         "thigh": np.array([8.0, 0.1, -1.6, 0.1, 0.5, 0.05, 0.5, 0.0, 0.0, 0.0]),
         "shank": np.array([4.0, 0.0, -0.8, 0.0, 0.3, 0.02, 0.3, 0.0, 0.0, 0.0]),
     }
-    rolls = [] if roll is None else [_core.AxisSpec("knee", "translation", X, scale="roll")]
+    rolls = [] if roll is None else [_core.AxisSpec("knee", "translation", X, [0.0] * power + [1.0], "roll")]
     segments = [
         _core.SegmentSpec("pelvis", axes=root, inertia=inertia["pelvis"]),
         _core.SegmentSpec(

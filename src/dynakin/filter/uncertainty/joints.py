@@ -9,7 +9,7 @@ from dynakin.bindings import _core
 from dynakin.filter.uncertainty.frames import Frame, differences
 from dynakin.filter.uncertainty.geometry import Geometry, Parts
 from dynakin.filter.uncertainty.sizes import CENTRES, OF_JOINTS, less_sure_joints
-from dynakin.filter.uncertainty.upright import rolls
+from dynakin.filter.uncertainty.upright import rolling_more, rolls
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.noise import Noise
 
@@ -17,14 +17,15 @@ Array = npt.NDArray[np.float64]
 
 
 class Joints:
-    """Kinds `OF_JOINTS`, "roll" (how far a joint's centre moves with its angle), and "hips" (what the priors leave open
-    of their centres)."""
+    """Kinds `OF_JOINTS`, "roll" (how far a joint's centre moves with the square of its angle), and "hips" (what the
+    priors leave open of their centres)."""
 
     def __init__(self, geometry: Geometry, calibrated: CalibratedModel, noise: Noise) -> None:
         self._geometry, errors = geometry, geometry.errors
         first = {name: k for k, name in enumerate(calibrated.names)}
         self._rolls = [first[name] for name in rolls(calibrated.spec) if name in first]
         gain, N = geometry.gain(geometry.upright())
+        self._rolling = _core.Model(rolling_more(calibrated.spec))
         self._B0 = gain @ np.hstack([N, self._rolled(geometry.reference)])
         kinds = np.array([*errors.kinds, *("roll" for _ in self._rolls)])
         self._columns = {kind: np.flatnonzero(kinds == kind) for kind in (*OF_JOINTS, "roll")}
@@ -51,12 +52,12 @@ class Joints:
         return found
 
     def _rolled(self, q: Array) -> Array:
-        """(3 M, L): what joints' centres that move with their angle do to the markers, a m/rad (`rolls`)."""
+        """(3 M, L): what joints' centres that move with their angle's square do to the markers, a m/rad^2."""
         if not self._rolls:
             return np.zeros((3 * len(self._geometry.segment), 0))
         x = self._geometry.x0.copy()
         x[: len(q)] = q
-        return np.asarray(_core.marker_jacobian(self._geometry.model, x)[:, self._rolls])
+        return np.asarray(_core.marker_jacobian(self._rolling, x)[:, self._rolls])
 
     def _rolled_moments(self, frame: Frame) -> Array:
         """(C, L): what they do to moments."""
@@ -64,5 +65,5 @@ class Joints:
             return np.zeros((self._geometry.count, 0))
         x, moving = self._geometry.x0.copy(), np.concatenate(frame.motion)
         x[: len(moving)] = moving
-        T = _core.moment_jacobian(self._geometry.model, x, frame.external)
+        T = _core.moment_jacobian(self._rolling, x, frame.external)
         return np.asarray(T[: self._geometry.count, self._rolls])

@@ -32,7 +32,8 @@ class Sizes:
             three of a shoulder, whose arm shows as little of how it is turned about itself) or three.
         root, root_tilt: rad, of the turn of the pelvis' frame in the pelvis about its first two axes, and about the
             third (to the side).
-        roll: m/rad, of how far the centre of a joint moves with its angle (knees'), where the model has that.
+        roll: m/rad^2, of how far the centre of a joint moves with the square of its angle (knees'), where the model
+            has it move with the angle.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
         mass_centre: m, of the centre of mass of each segment off where the model has it.
         limbs: part of the distance from its joint by which the centres of mass of a limb that no marker shows lie
@@ -98,7 +99,7 @@ LANDMARKS = Sizes(
     ball_axes=np.radians(1.0),
     root=np.radians(1.0),
     root_tilt=np.radians(5.0),
-    roll=0.0065,
+    roll=0.0041,
     skin=0.085,
     mass_centre=0.012,
     limbs=0.6,

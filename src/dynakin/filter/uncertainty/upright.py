@@ -3,6 +3,8 @@ centres that roll."""
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 import numpy.typing as npt
 
@@ -81,6 +83,20 @@ def rolls(spec: _core.ModelSpec) -> list[str]:
     """Lengths by which the centre of a joint moves with its angle, as elements of the state."""
     axes = [axis for segment in spec.segments for axis in segment.axes if axis.kind == "translation"]
     return [f"length/{scale}" for scale in dict.fromkeys(a.scale for a in axes if a.coordinate and a.scale)]
+
+
+def rolling_more(spec: _core.ModelSpec) -> _core.ModelSpec:
+    """A copy in which these centres move as much more as the joint is bent more: ``rolls`` are a rad of the angle."""
+    spec = copy(spec)
+    segments = spec.segments
+    for segment in segments:
+        axes = segment.axes
+        for axis in axes:
+            if axis.kind == "translation" and axis.coordinate and axis.scale:
+                axis.coefficients = [0.0, *axis.coefficients]
+        segment.axes = axes
+    spec.segments = segments
+    return spec
 
 
 def drives(spec: _core.ModelSpec, free: npt.NDArray[np.intp]) -> Array:
