@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.frames import _STEP_S
 from dynakin.filter.uncertainty.geometry import BLOCKS
-from dynakin.filter.uncertainty.joint_errors import OF_ROOT, JointErrors
+from dynakin.filter.uncertainty.joint_errors import OF_FRAMES, JointErrors
 from dynakin.filter.uncertainty.sizes import LANDMARKS, OF_JOINTS, SHOWS_HIPS_RAD
 from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.filter.uncertainty.upright import hips_turned, neutral, trunks_of
@@ -112,7 +112,7 @@ def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_o
     external[2, 1] = 500.0
     parts = parts_of(systematic(), q, still, still, external)
     R = rotation(0.3 * Y)
-    for kind, axes in (("root", (X, Y)), ("root_tilt", (Z,))):
+    for kind, axes in (("root_frame", (X, Y)), ("frame_tilt", (Z,))):
         expected = np.zeros(3)
         for e in axes:
             turned = Rotation.from_matrix(R @ rotation(1e-6 * e)).as_euler("ZXY") - np.array([0.0, 0.0, 0.3])
@@ -167,9 +167,34 @@ def test_a_pelvis_is_as_sure_whichever_way_the_person_faces() -> None:
         still = np.zeros_like(q)
         parts = parts_of(found, q, still, still)
         places = [standing.names.index(name) for name in ("hip_flexion_r", "hip_adduction_r", "hip_rotation_r")]
-        said.append(np.concatenate([parts[kind]["coordinates"][places] for kind in OF_ROOT]))
-        assert all((parts[kind]["coordinates"] < 0.3).all() for kind in OF_ROOT)
+        said.append(np.concatenate([parts[kind]["coordinates"][places] for kind in OF_FRAMES]))
+        assert all((parts[kind]["coordinates"] < 0.3).all() for kind in OF_FRAMES)
     np.testing.assert_allclose(said[1:], [said[0]] * 2, rtol=0.1, atol=1e-6)
+
+
+def test_a_trunk_frame_that_is_tilted_mixes_bending_and_rotation() -> None:
+    person = measured()
+    found = Systematic(person, Noise())
+    errors, names = found.geometry.errors, [c.name for c in person.spec.coordinates]
+    assert [j for k, j in zip(errors.kinds, errors.joints, strict=True) if k == "frame_tilt"] == ["pelvis", "torso"]
+    q = found.geometry.reference.copy()
+    bent = np.array([0.0, 0.2, -0.15])  # about z, x and y in turn, as OpenSim's
+    spine = [person.names.index(f"lumbar_{angle}") for angle in ("extension", "bending", "rotation")]
+    q[spine] = bent
+    parts = parts_of(found, q, np.zeros_like(q), np.zeros_like(q))["frame_tilt"]
+
+    def turned(pelvis: float, trunk: float) -> Array:
+        """Angles between frames that are turned in their bones, without their zero."""
+
+        def seen(angles: Array) -> Array:
+            R = rotation(-pelvis * Z) @ Rotation.from_euler("ZXY", angles).as_matrix() @ rotation(trunk * Z)
+            return np.asarray(Rotation.from_matrix(R).as_euler("ZXY"))
+
+        return (seen(bent) - bent) - seen(np.zeros(3))
+
+    expected = np.hypot(turned(1e-6, 0.0), turned(0.0, 1e-6)) / 1e-6
+    at = [names.index(person.names[k]) for k in spine]
+    np.testing.assert_allclose(np.sqrt(parts["coordinates"][at]), expected, rtol=0.03, atol=2e-3)
 
 
 def test_arms_have_their_zero_where_they_hang() -> None:

@@ -10,7 +10,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
-from dynakin.filter.uncertainty.joint_errors import OF_ROOT, JointErrors
+from dynakin.filter.uncertainty.joint_errors import OF_FRAMES, JointErrors
 from dynakin.filter.uncertainty.upright import neutral, trunks_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
@@ -55,7 +55,7 @@ class Geometry:
         x = self.upright()
         self._R0 = _core.segment_poses(self.errors.model, x)[0]
         self._D0 = self._displacements(_core.marker_jacobian(self.errors.model, x))
-        self._D0[:, [kind in OF_ROOT for kind in self.errors.kinds]] = 0.0
+        self._D0[:, [kind in OF_FRAMES for kind in self.errors.kinds]] = 0.0
 
     def upright(self) -> Array:
         """(n,) state of the larger model that stands still in the reference posture."""

@@ -28,15 +28,16 @@ Kind = Literal[
     "hinge_axes",
     "pair_axes",
     "ball_axes",
-    "root",
-    "root_tilt",
+    "root_frame",
+    "frame_tilt",
 ]
 """The centre of a joint with one or two axes (hinge) off where it is on its bones, or with three (ball; the spine's)
 within its parent's sagittal plane and across that; its one axis, two or three turned on both bones, those on the trunk
-(shoulders) counted with those of two; the root's frame turned in its bone, about its third axis (tilt) or another."""
+(shoulders) counted with those of two; the root's frame turned in its bone, about its third axis (tilt, the trunk's as
+well) or another."""
 BALLS: tuple[Kind, ...] = ("ball_centre", "ball_across")
 """Centres of joints with three axes that are not the spine's."""
-OF_ROOT: tuple[Kind, ...] = ("root", "root_tilt")
+OF_FRAMES: tuple[Kind, ...] = ("root_frame", "frame_tilt")
 """What moves no marker beside its bone."""
 Column = dict[str, float]
 
@@ -191,8 +192,8 @@ def _sources(
     held: set[str],
     trunks: Collection[str],
 ) -> list[tuple[Kind, str, Column]]:
-    """Unit errors along the ground's axes in the reference posture, of balls' centres along their parent's, of the
-    root's frame about its own: kind, segment of the joint, and how they move the errors' coordinates."""
+    """Unit errors along the ground's axes in the reference posture, of balls' centres along their parent's, of
+    frames about their own: kind, segment of the joint, and how they move the errors' coordinates."""
     planar = not all(spec.markers[0].measured)
     joints = _turning(spec)
     found: list[tuple[Kind, str, Column]] = []
@@ -201,11 +202,11 @@ def _sources(
             continue
         name, R_B = segment.name, orientations[segment.name]
         children = [child for child in spec.segments if child.parent == name]
+        jointed = [child for child in children if child.name in joints]
         if segment.parent == "ground":
             if not planar and floats(segment):
-                jointed = [c for c in children if c.name in joints]
-                kinds: tuple[Kind, ...] = ("root", "root", "root_tilt")
-                roots = [_root_turned(name, R_B, jointed, e) for e in R_B.T]
+                kinds: tuple[Kind, ...] = ("root_frame", "root_frame", "frame_tilt")
+                roots = [_frame_turned(name, R_B, jointed, e) for e in R_B.T]
                 found += [(kind, name, column) for kind, column in zip(kinds, roots, strict=True)]
             continue
         R_J = orientations[segment.parent] @ segment.rotation
@@ -218,6 +219,8 @@ def _sources(
                 column |= _along(child.name, "moved", R_B @ child.rotation, -e)
             found.append((_centre(axes, k, name in trunks), name, column))
         if not planar:
+            if name in trunks:
+                found.append(("frame_tilt", name, _frame_turned(name, R_B, jointed, R_B.T[2])))
             both = [_along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e) for e in _AXES]
             turned = "pair_axes" if segment.parent in trunks else _TURNED[axes]
             found += [(turned, name, column) for column in both]
@@ -232,8 +235,8 @@ def _centre(axes: int, direction: int, spine: bool) -> Kind:
     return "spine_centre" if spine else "ball_centre"
 
 
-def _root_turned(name: str, R_B: Array, children: Sequence[_core.SegmentSpec], e: Array) -> Column:
-    """The root's frame turned by e in its bone: seen from the frame, the bone with its markers and the centres of its
+def _frame_turned(name: str, R_B: Array, children: Sequence[_core.SegmentSpec], e: Array) -> Column:
+    """A frame turned by e in its bone: seen from the frame, the bone with its markers and the centres of its
     joints is turned by -e; the axes of these joints stay with the frame."""
     column = _along(name, "behind", R_B, -e)
     for child in children:

@@ -30,8 +30,8 @@ class Sizes:
         spine_centre: m, of the trunk's on the pelvis along the first two: one joint stands for all of the spine's.
         hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar; the
             three of a shoulder, whose arm shows as little of how it is turned about itself) or three.
-        root, root_tilt: rad, of the turn of the pelvis' frame in the pelvis about its first two axes, and about the
-            third (to the side).
+        root_frame, frame_tilt: rad, of the turn of the pelvis' frame in the pelvis about its first two axes, and about
+            the third (to the side); the trunk's in the trunk about its third.
         roll: m/rad^2, of how far the centre of a joint moves with the square of its angle (knees'), where the model
             has it move with the angle.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
@@ -63,8 +63,8 @@ class Sizes:
     hinge_axes: float
     pair_axes: float
     ball_axes: float
-    root: float
-    root_tilt: float
+    root_frame: float
+    frame_tilt: float
     roll: float
     skin: float
     mass_centre: float
@@ -97,8 +97,8 @@ LANDMARKS = Sizes(
     hinge_axes=np.radians(2.8),
     pair_axes=np.radians(4.0),
     ball_axes=np.radians(1.0),
-    root=np.radians(1.0),
-    root_tilt=np.radians(5.0),
+    root_frame=np.radians(1.0),
+    frame_tilt=np.radians(5.0),
     roll=0.0041,
     skin=0.085,
     mass_centre=0.012,
@@ -111,7 +111,7 @@ LANDMARKS = Sizes(
     vigorous=33.0,
     own_off_plates=0.14,
 )
-"""Joints that are found from markers on the skin. ``spine_centre``, ``root_tilt`` and ``skin_found`` were chosen on
+"""Joints that are found from markers on the skin. ``spine_centre``, ``frame_tilt`` and ``skin_found`` were chosen on
 simulated walks and squats of four people and judged on those of four others (docs/validation/deviations.md)."""
 UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
 """Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
@@ -146,8 +146,8 @@ SCALED = Sizes(
     hinge_axes=np.radians(1.3),
     pair_axes=np.radians(1.3),
     ball_axes=np.radians(0.8),
-    root=np.radians(0.9),
-    root_tilt=np.radians(0.9),
+    root_frame=np.radians(0.9),
+    frame_tilt=np.radians(0.9),
     roll=0.0,
     skin=0.08,
     mass_centre=0.003,
