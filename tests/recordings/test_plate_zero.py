@@ -11,6 +11,7 @@ import pytest
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.formats.c3d import read_c3d
 from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.recording import Plate
 from support.made_c3d import made_c3d
 from support.made_recordings import standing
 
@@ -20,7 +21,7 @@ STEP *= np.repeat((np.arange(FRAMES) > 50) & (np.arange(FRAMES) < 130), PER_FRAM
 PUSH = np.stack([60.0 * STEP, 10.0 * STEP, -800.0 * STEP, 40.0 * STEP, 20.0 * STEP, 0.0 * STEP])
 CORNERS = np.array([[200.0, 300, 0], [-200, 300, 0], [-200, -300, 0], [200, -300, 0]])
 UNITS = ["N"] * 3 + ["Nm"] * 3
-OFFSET = np.array([[15.0], [-20.0], [40.0], [3.0], [2.0], [-0.5]])
+OFFSET = np.array([[15.0], [-20.0], [-40.0], [3.0], [2.0], [-0.5]])
 
 
 def zeroed(
@@ -124,11 +125,40 @@ def test_a_plate_that_is_loaded_wherever_the_feet_are_is_to_be_zeroed() -> None:
     assert "zero it with nobody on it" in found.refusal
 
 
-@pytest.mark.parametrize(("offset_n", "kept_n"), [(-30.0, -30.0), (30.0, 0.0), (-3.0, 0.0)])
-def test_what_a_plate_reads_below_nothing_is_kept_in_mind(tmp_path: Path, offset_n: float, kept_n: float) -> None:
-    """It is 0 while the plate is empty, as no plate pulls, and missing under a foot."""
-    path = tmp_path / "a.c3d"
+def plate_of(path: Path, off: np.ndarray | float) -> tuple[Plate, list[str]]:
+    """Of a step with so much more push throughout (N), and what is said of it."""
     channels = PUSH.copy()
-    channels[2] -= offset_n
+    channels[2] -= off
     zeroed(path, channels, (), {"LHEE": np.tile([0.0, 0.0, 0.6], (FRAMES, 1))})
-    assert read_c3d(path).plates[0].empty_n == pytest.approx(kept_n, abs=0.5)
+    recording = read_c3d(path)
+    return recording.plates[0], [str(said) for said in recording.notes if "nobody stands" in str(said)]
+
+
+def test_what_a_plate_reads_steadily_below_nothing_is_taken_off(tmp_path: Path) -> None:
+    """No load pulls: under a foot it is missing as well."""
+    clean, said = plate_of(tmp_path / "clean.c3d", 0.0)
+    assert not said
+    for off, word in ((-30.0, "Warning: plate 1 reads -30 N"), (-5.0, "plate 1 reads -5 N")):
+        found, said = plate_of(tmp_path / "a.c3d", off)
+        np.testing.assert_allclose(found.force, clean.force, atol=1e-6)
+        np.testing.assert_allclose(found.moment, clean.moment, atol=1e-6)
+        assert found.empty_n == 0.0
+        assert said == [f"{word} where nobody stands on it: it is taken off over the whole trial."]
+
+
+def test_a_plate_that_drifts_below_nothing_keeps_it_in_mind(tmp_path: Path) -> None:
+    """It is 0 while the plate is empty, and missing under a foot: nobody knows how much."""
+    clean, _ = plate_of(tmp_path / "clean.c3d", 0.0)
+    drift = np.linspace(-5.0, -45.0, PUSH.shape[1])
+    found, said = plate_of(tmp_path / "a.c3d", drift)
+    assert -45.0 < found.empty_n < -5.0 and "(not taken off)" in said[0]
+    loaded = np.linalg.norm(clean.force, axis=1) > 1.0
+    assert np.abs(found.force[~loaded]).max() < 1.0 and np.linalg.norm(found.force - clean.force, axis=1).max() > 10.0
+
+
+def test_what_may_be_a_light_load_is_left_to_the_markers(tmp_path: Path) -> None:
+    found, said = plate_of(tmp_path / "a.c3d", 8.0)
+    up = int(np.argmax(found.force.mean(axis=0)))
+    assert np.median(found.force[:, up]) == pytest.approx(8.0, abs=0.1) and "or by a light load" in said[0]
+    noise, said = plate_of(tmp_path / "b.c3d", -2.0)
+    assert noise.empty_n == 0.0 and not said

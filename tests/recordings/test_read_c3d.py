@@ -293,9 +293,11 @@ def test_other_units_are_converted_and_unknown_ones_are_named(
     )
 
 
-def test_each_plate_is_kept_and_an_idle_one_is_zero(tmp_path: Path) -> None:
+@pytest.mark.parametrize("offset_n", [2.0, 6.0])
+def test_each_plate_is_kept_and_an_idle_one_is_empty(tmp_path: Path, offset_n: float) -> None:
+    """Noise is 0; whether more than that is somebody's load markers will say."""
     idle = np.full_like(channels_of(2), 0.0)
-    idle[2] = -6.0  # an offset below the threshold
+    idle[2] = -offset_n
     shifted = turned(R_LP) + np.array([0, 700.0, 0])
     path = write_c3d(
         tmp_path / "a.c3d",
@@ -307,12 +309,15 @@ def test_each_plate_is_kept_and_an_idle_one_is_zero(tmp_path: Path) -> None:
     )
     recording = read(path)
     assert [plate.name for plate in recording.plates] == ["plate 1", "plate 2"]
-    np.testing.assert_array_equal(recording.plates[1].force, 0.0)
-    np.testing.assert_array_equal(recording.plates[1].moment, 0.0)
-    assert np.isnan(recording.plates[1].cop).all()
-    assert any("plate 2 reads 6 N where nobody stands" in note for note in map(str, recording.notes))
+    idle_plate = recording.plates[1]
+    assert np.isnan(idle_plate.cop).all()
+    np.testing.assert_allclose(idle_plate.force[:, 2], 0.0 if offset_n < 3.0 else offset_n, rtol=1e-5)
+    said = [note for note in map(str, recording.notes) if "where nobody stands" in note]
+    assert len(said) == (offset_n > 3.0) and all("plate 2 reads 6 N" in text for text in said)
     kept = read(path, force_threshold_n=0.0)
-    np.testing.assert_allclose(kept.plates[1].force[:, 2], 6.0, rtol=1e-5)
+    np.testing.assert_allclose(kept.plates[1].force[:, 2], offset_n, rtol=1e-5)
+    emptied = read(path, force_threshold_n=10.0)
+    np.testing.assert_array_equal(emptied.plates[1].force, 0.0)
 
 
 @settings(max_examples=15, deadline=None)

@@ -8,6 +8,8 @@ that its centre of pressure has there (1 N m of noise moves it by 0.1 m)."""
 LOADED_N = 20.0
 """Push from which a plate, or a foot, is loaded: its centre of pressure is then known to a few cm (1 N m: 5 cm), which
 is what it takes to say which foot presses, or where a force acts."""
+NOISE_N = 3.0
+"""The noise of the usual plates: what reads less is at zero."""
 JUDGED_N = 50.0
 """Push from which something is said of a plate: a load where no foot stands, a force beyond friction, standing. What is
 lighter may be a cable, a step on the edge, a drift; no offset of a plate in order reaches it."""

@@ -25,13 +25,11 @@ from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.orientation import axis_vector
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.loads import without_wrench
-from dynakin.recordings.pushes import JUDGED_N, MOST_OFFSET_N, UNLOADED_N
+from dynakin.recordings.pushes import JUDGED_N, MOST_OFFSET_N, NOISE_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Recording
 
 Flags = npt.NDArray[np.bool_]
 
-NOISE_N = 3.0
-"""The noise of the usual plates: what reads less is at zero."""
 CLEAR_S, CLEAR_M = 0.5, 0.3
 """How long no foot must be near a plate, and how far (its middle) is surely not on it: its own length."""
 PRESSED_M = 0.2

@@ -13,7 +13,7 @@ from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, 
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.axes import pulling, turned_in_words
-from dynakin.recordings.plates.pressure import Surface, main_axis, plate_from_wrench
+from dynakin.recordings.plates.pressure import Surface, main_axis, plate_from_wrench, read_while_empty
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
 from dynakin.recordings.pushes import LOADED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
@@ -252,7 +252,8 @@ def _resampled(plate: Plate, table: Table, time: Array, options: ReadOptions) ->
         surface,
         corners=None,
         threshold_n=threshold,
-        zero_unloaded=True,
+        # markers will say whether what it reads while it is empty is a light load, or under a foot as well
+        zero_unloaded=options.force_threshold_n is not None or not read_while_empty(wrench[:, :3] @ surface.normal),
     )
 
 

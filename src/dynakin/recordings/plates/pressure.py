@@ -9,8 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.arrays import cross, filled
-from dynakin.recordings.pushes import LOADED_N
+from dynakin.recordings.pushes import JUDGED_N, LOADED_N, MOST_OFFSET_N, NOISE_N
 from dynakin.recordings.recording import Array, Plate
+
+_LEAST_IDLE = 0.05
+"""Part of the time without a load in which a plate shows what it reads then."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,15 @@ def pressed_at(wrench: Array, height_m: float | Array = 0.0, least_n: float = LO
     fx, fy, fz, mx, _, mz = np.moveaxis(filled(wrench), -1, 0)
     push = np.where(fy >= least_n, fy, np.nan)
     return np.stack([mz + fx * height_m, fz * height_m - mx], axis=-1) / push[..., None]
+
+
+def read_while_empty(push: Array) -> float:
+    """What a plate reads without a load, N: the median of pushes (T,) along its normal that are none; 0 where that is
+    noise, or where there are too few."""
+    known = np.nan_to_num(push, nan=np.inf)
+    idle = (known > -MOST_OFFSET_N) & (known < JUDGED_N)
+    middle = float(np.median(push[idle])) if idle.mean() >= _LEAST_IDLE else 0.0
+    return middle if abs(middle) > NOISE_N else 0.0
 
 
 def plate_from_wrench(
