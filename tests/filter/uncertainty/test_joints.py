@@ -232,13 +232,13 @@ def test_axes_of_shoulders_are_less_sure_than_those_of_hips() -> None:
     found = Systematic(person, Noise())
     errors = found.geometry.errors
     kinds = {joint: kind for kind, joint in zip(errors.kinds, errors.joints, strict=True) if kind.endswith("_axes")}
-    assert {kinds[f"upper_arm_{side}"] for side in "rl"} == {"pair_axes"}
+    assert {kinds[f"upper_arm_{side}"] for side in "rl"} == {"shoulder_axes"}
     assert {kinds[f"thigh_{side}"] for side in "rl"} == {kinds["torso"]} == {"ball_axes"}
     q = found.geometry.reference.copy()
     q[person.names.index("arm_flex_r")] += 0.3
     still = np.zeros_like(q)
     adduction = [c.name for c in person.spec.coordinates].index("arm_add_r")
-    variance = parts_of(found, q, still, still)["pair_axes"]["coordinates"][adduction]
+    variance = parts_of(found, q, still, still)["shoulder_axes"]["coordinates"][adduction]
     assert np.sqrt(variance) == pytest.approx(0.3, rel=0.3)
 
 

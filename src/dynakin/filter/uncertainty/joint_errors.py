@@ -28,13 +28,14 @@ Kind = Literal[
     "hinge_axes",
     "pair_axes",
     "ball_axes",
+    "shoulder_axes",
     "root_frame",
     "frame_tilt",
 ]
 """The centre of a joint with one or two axes (hinge) off where it is on its bones, or with three (ball; the spine's)
-within its parent's sagittal plane and across that; its one axis, two or three turned on both bones, those on the trunk
-(shoulders) counted with those of two; the root's frame turned in its bone, about its third axis (tilt, the trunk's as
-well) or another."""
+within its parent's sagittal plane and across that; its one axis, two or three turned on both bones, or those of what
+hangs on the trunk and bears another joint; the root's frame turned in its bone, about its third axis (tilt, the trunk's
+as well) or another."""
 BALLS: tuple[Kind, ...] = ("ball_centre", "ball_across")
 """Centres of joints with three axes that are not the spine's."""
 OF_FRAMES: tuple[Kind, ...] = ("root_frame", "frame_tilt")
@@ -222,7 +223,7 @@ def _sources(
             if name in trunks:
                 found.append(("frame_tilt", name, _frame_turned(name, R_B, jointed, R_B.T[2])))
             both = [_along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e) for e in _AXES]
-            turned = "pair_axes" if segment.parent in trunks else _TURNED[axes]
+            turned = "shoulder_axes" if segment.parent in trunks and jointed else _TURNED[axes]
             found += [(turned, name, column) for column in both]
     return found
 

@@ -28,8 +28,9 @@ class Sizes:
         ball_centre, ball_across: m, of the centre of one with three (hip) along the first two axes of its parent
             (forwards and up), and along the third (to the side).
         spine_centre: m, of the trunk's on the pelvis along the first two: one joint stands for all of the spine's.
-        hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar; the
-            three of a shoulder, whose arm shows as little of how it is turned about itself) or three.
+        hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar) or
+            three.
+        shoulder_axes: rad, of the turn of a shoulder's, whose arm shows little of how it is turned about itself.
         root_frame, frame_tilt: rad, of the turn of the pelvis' frame in the pelvis about its first two axes, and about
             the third (to the side); the trunk's in the trunk about its third.
         roll: m/rad^2, of how far the centre of a joint moves with the square of its angle (knees'), where the model
@@ -63,6 +64,7 @@ class Sizes:
     hinge_axes: float
     pair_axes: float
     ball_axes: float
+    shoulder_axes: float
     root_frame: float
     frame_tilt: float
     roll: float
@@ -97,6 +99,7 @@ LANDMARKS = Sizes(
     hinge_axes=np.radians(2.8),
     pair_axes=np.radians(4.0),
     ball_axes=np.radians(1.0),
+    shoulder_axes=np.radians(4.0),
     root_frame=np.radians(1.0),
     frame_tilt=np.radians(5.0),
     roll=0.0041,
@@ -146,6 +149,7 @@ SCALED = Sizes(
     hinge_axes=np.radians(1.3),
     pair_axes=np.radians(1.3),
     ball_axes=np.radians(0.8),
+    shoulder_axes=np.radians(1.3),
     root_frame=np.radians(0.9),
     frame_tilt=np.radians(0.9),
     roll=0.0,
