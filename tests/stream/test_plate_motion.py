@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import dynakin
 from dynakin.filter.ground.delay import Delay, brought_into_step
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.trial import simulate
+from dynakin.stream.plates import _other_mass
 from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame
 from dynakin.stream.sources.replay import Replay
@@ -89,6 +91,14 @@ def test_a_mass_that_the_plates_contradict_is_said_once() -> None:
     _, said, _ = session(squat().with_plates(late))
     (text,) = [text for text in said if "check the mass" in text]
     assert "Warning: the plates carry 76." in text and "weighs 70.0 kg" in text
+
+
+@pytest.mark.parametrize(("load_kg", "said"), [(70.5, "carry the person's 70.0 kg"), (60.0, "carry 60.0 kg where")])
+def test_something_that_always_pulls_is_another_mass_only_where_plates_carry_one(load_kg: float, said: str) -> None:
+    person: Any = SimpleNamespace(weighed_kg=70.0, unseen_kg=0.0)
+    found = _other_mass(person, load_kg, 1.0)
+    assert found is not None and f"the plates {said}" in found.text and "something that no plate measures" in found.text
+    assert _other_mass(person, load_kg, 0.5) is None
 
 
 def test_what_a_seat_bears_is_no_other_mass(data_dir: Path) -> None:

@@ -74,6 +74,14 @@ def test_moments_of_who_moves_at_the_start_are_right_from_then_on() -> None:
     assert np.abs([one.moments["knee"] for one in first] - true).max() < 2.0  # 8 where the first frames are passed over
 
 
+def test_a_standing_trial_that_nobody_gave_is_not_blamed() -> None:
+    trial = simulate_squat(seed=1, duration_s=8.0)
+    _, said, _ = run(Replay(trial.recording.window(3.0, 5.0), speed=0.0), standing_s=0.4, standing_wait_s=1.2)
+    assert any(text.startswith("Nobody stood still") for text in said)
+    assert any("Stand still at the start, or give a standing trial" in text for text in said)
+    assert not any("nobody stands still in" in text for text in said)
+
+
 def test_a_lag_is_shown_as_its_delay(squat: Recording) -> None:
     frames, _, _ = run(Replay(squat, speed=0.0, duration_s=4.0), lag_s=0.2)
     last = frames[-1]

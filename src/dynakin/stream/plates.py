@@ -185,6 +185,13 @@ def _other_mass(initial: CalibratedModel, load_kg: float, foreign: float) -> Mes
         return doubtful_mass(initial, load_kg)
     if foreign <= NEARLY_ALL:
         return None
+    if doubtful_mass(initial, load_kg) is None:
+        return warning(
+            "weight",
+            f"the plates carry the person's {initial.weighed_kg:.1f} kg, and something that no plate measures pushes "
+            "or pulls the person all the time (a rail, a wall, a cable), or the horizontal forces are wrong: declare "
+            "it as a contact, or zero the plates. Moments take the error on.",
+        )
     return warning(
         "weight",
         f"the plates carry {load_kg:.1f} kg where the person weighs {initial.weighed_kg:.1f} kg, all the time: the "

@@ -304,8 +304,10 @@ class Live:
             self.say(f"{error.message}; trying again.")
             self._window.clear()
             return
+        on_the_move = bool(moving) and self.static is None  # that nobody stood has been said
         for message in said:
-            self.say(message)
+            if not (on_the_move and message.topic == "standing"):
+                self.say(message)
         self.plates.measured(said, usable)
         self._come_up(moving)
         self._begin_running("Ready: move.")
