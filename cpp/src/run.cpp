@@ -76,7 +76,19 @@ RunRecord::RunRecord(const Model& of, std::size_t frames, Said what, bool of_sen
       constrained(frames),
       verdicts(frames * (of.markers().size() + 1)),
       tracking(frames),
-      constraints_met(frames) {}
+      constraints_met(frames),
+      at_limit(frames * static_cast<std::size_t>(of.n_free())) {}
+
+namespace {
+
+// Smoothed, such a coordinate lies inside: later frames pull at it, and skin takes what it may not have.
+void note_limits(const Filter& filter, std::uint8_t* held, Eigen::Index coordinates) {
+  const auto x = filter.state().head(coordinates).array();
+  const auto &lower = filter.settings().lower, &upper = filter.settings().upper;
+  for (Eigen::Index i = 0; i < coordinates; ++i) held[i] = x(i) <= lower(i) || x(i) >= upper(i);
+}
+
+}  // namespace
 
 Helped::Helped(Filter& filter)
     : filter_(filter), other_(most_threads()), helper_(other_ && filter.model().state_size() >= k_worth_sharing) {
@@ -87,6 +99,7 @@ void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size
                 ContactRecord* contacts) {
   using clock = std::chrono::steady_clock;
   const std::size_t m = 3 * filter.model().markers().size();
+  const int n_free = filter.model().n_free();
   filter.report_sensors(record.sensors);
   WrenchModel how;
   std::optional<Helped> helped;
@@ -105,6 +118,7 @@ void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size
     record.constrained[k] = report.constrained;
     record.tracking[k] = static_cast<std::uint8_t>(report.tracking);
     record.constraints_met[k] = report.constraints_met;
+    note_limits(filter, record.at_limit.data() + k * static_cast<std::size_t>(n_free), n_free);
     std::transform(filter.verdicts().begin(), filter.verdicts().end(),
                    record.verdicts.begin() + static_cast<std::ptrdiff_t>(k * filter.verdicts().size()),
                    [](Verdict verdict) { return static_cast<std::uint8_t>(verdict); });

@@ -165,5 +165,8 @@ def test_a_filter_that_is_reset_starts_from_nothing(spec):
     f = filter_of(spec, options, data.x0, data.P0)
     first = f.run(data.time, data.markers, data.wrench)
     assert first["constrained"].any()
+    angles = first["state"][:, : first["at_limit"].shape[1]]
+    lower, upper = (np.asarray(options[name])[: angles.shape[1]] for name in ("lower", "upper"))
+    np.testing.assert_array_equal(first["at_limit"], (angles <= lower) | (angles >= upper))
     f.reset(data.x0, data.P0)
     np.testing.assert_array_equal(f.run(data.time, data.markers, data.wrench)["state"], first["state"])

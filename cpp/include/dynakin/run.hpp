@@ -56,6 +56,7 @@ struct RunRecord : StateRecord {
   std::vector<int> rows, constrained;
   std::vector<std::uint8_t> verdicts;  // (frames, markers + 1), of each marker and, last, of the plates
   std::vector<std::uint8_t> tracking, constraints_met;
+  std::vector<std::uint8_t> at_limit;  // (frames, free coordinates), which the filter held at an end of its range
 };
 
 // A place for a second thread (threads.hpp) as long as this lives, false where there is none; it helps the filter where

@@ -60,6 +60,8 @@ nb::dict arrays_of(RunRecord&& record, std::size_t frames) {
   out["constrained"] = owned(std::move(record.constrained), {frames});
   out["verdicts"] = owned(std::move(record.verdicts), {frames, n_markers + 1});
   out["tracking"] = owned(std::move(record.tracking), {frames});
+  const auto n_free = static_cast<std::size_t>(record.model.n_free());
+  out["at_limit"] = owned(std::move(record.at_limit), {frames, n_free});
   out["constraints_met"] = owned(std::move(record.constraints_met), {frames});
   return out;
 }

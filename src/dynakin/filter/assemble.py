@@ -240,6 +240,9 @@ def _dataset(
     data["state_sd"] = (("time", "element"), arrays["state_sd"])
     for name in ("nis", "n_rows", "log_likelihood", "constrained", "constraints_met", "tracking", "step_us"):
         data[name] = ("time", arrays[name])
+    held = np.zeros((len(measured.time), len(spec.coordinates)), dtype=bool)
+    held[:, free_coordinates(spec)] = arrays["at_limit"]
+    data["at_limit"] = (("time", "coordinate"), held)
     data |= _sensors(arrays, np.asarray(np.isnan(measured.wrench).all(axis=1)))
     if initial.feet or any(any(marker.soft_tissue) for marker in spec.markers):
         data["soft_tissue_amplitude"] = ("marker", initial.soft_tissue_m, {"units": "m"})
