@@ -181,7 +181,12 @@ def against(
         "none" if case in PLANAR else "scaled" if tracker.calibrated.plan is None else "landmarks",
         tuple(chosen),
         error,
-        replace(frames, sd={block: frames.sd[block][here] for block in blocks}, sources=frames.sources[here]),
+        replace(
+            frames,
+            sd={block: frames.sd[block][here] for block in blocks},
+            sources=frames.sources[here],
+            ends=frames.ends[window],
+        ),
         intensity[window],
         systematic.moved_m(frames.states)[window],
         {kind: {block: part[block][here] for block in blocks} for kind, part in parts.items()},

@@ -157,6 +157,7 @@ def one_frame(own: Blocks, x: Array, P: Array, *, late: bool, rate: Array | None
         segments=["shank"],
         used=np.ones((1, 12), dtype=bool),
         sources=np.full((1, len(Q)), MEASURED, dtype=np.uint8),
+        ends=np.zeros(1, dtype=bool),
         off_plates=False,
         late=late,
         variance_scale=scale,

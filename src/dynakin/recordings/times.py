@@ -18,6 +18,8 @@ from dynakin.messages import Message, note
 
 Array = npt.NDArray[np.float64]
 
+ENDS_S = 0.03
+"""How near a recording's ends frames on one side alone help: how much the movement changes there is a guess."""
 _PAUSE_S = 1.0  # nothing is led across it
 _FEW = 9  # frames, over which the scatter of time stamps is averaged
 
@@ -176,3 +178,10 @@ def _stamped(off: Array, samples: Array, step: float) -> bool:
     part = along.sum() / size.sum()
     error = np.sqrt(np.square(along - part * size).sum()) / size.sum()
     return bool(part + _SURE * error < 0.5)
+
+
+def at_the_ends(time: Array) -> npt.NDArray[np.bool_]:
+    """(T,) which of several frames lie within `ENDS_S` of the first or the last."""
+    if len(time) < 2:
+        return np.zeros(len(time), dtype=bool)
+    return np.asarray(np.minimum(time - time[0], time[-1] - time) < ENDS_S - 1e-9)

@@ -13,6 +13,7 @@ import xarray as xr
 from dynakin.filter.uncertainty.frames import any_off_plates
 from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Parts
 from dynakin.filter.uncertainty.reported import (
+    OWN_AT_ENDS,
     OWN_AT_ONCE,
     OWN_LATE,
     STILL,
@@ -23,6 +24,7 @@ from dynakin.filter.uncertainty.reported import (
 )
 from dynakin.filter.uncertainty.sizes import KINDS, LANDMARKS, SCALED, Sizes
 from dynakin.filter.uncertainty.systematic import Systematic
+from dynakin.recordings.times import at_the_ends
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
 from dynakin.settings.noise import Noise
 from support.systematic_leg import (
@@ -77,6 +79,20 @@ def test_intensity_is_the_mean_square_of_accelerations_over_their_deviations_of_
     acceleration, sd = np.array([[2.0, 3.0, 5.0], [0.0, 0.0, 1.0]]), np.array([[1.0, 3.0, 0.0], [1.0, 1.0, 0.0]])
     np.testing.assert_allclose(movement_intensity(acceleration, sd), [(4.0 + 1.0) / 2.0, 0.0])
     assert movement_intensity(np.ones(3), np.zeros(3)) == 0.0
+
+
+def test_smoothed_frames_at_the_ends_are_no_surer_than_frames_on_one_side_make_them() -> None:
+    own = {block: np.ones((10, 1)) for block in ("coordinates", "speeds", "moments")}
+    parts = {kind: {block: np.zeros((10, 1)) for block in own} for kind in KINDS}
+    calm, ends = np.zeros(10), at_the_ends(0.01 * np.arange(10))
+    late, soon = (
+        reported_of(own, calm, replace(NONE, inertia=False), parts, late=each, step_s=0.01, ends=ends)
+        for each in (True, False)
+    )
+    for block, within in (("coordinates", 1.0), ("speeds", STILL), ("moments", STILL)):
+        there = within if block == "coordinates" else OWN_AT_ENDS
+        np.testing.assert_allclose(late[block][:, 0] ** 2, [there] * 3 + [within] * 4 + [there] * 3)
+        assert np.ptp(soon[block]) == 0.0
 
 
 def test_an_impact_counts_for_the_smoothed_moments_around_it() -> None:

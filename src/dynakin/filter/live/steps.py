@@ -105,6 +105,7 @@ class Steps:
                 segments=step.segments,
                 used=step.used[None],
                 sources=(step.sources if step.unmeasured else as_believed(step.sources))[None],
+                ends=np.zeros(1, dtype=bool),  # a session has none
                 off_plates=self.off_plates,
                 late=late,
                 variance_scale=found_noise.variance_scale,

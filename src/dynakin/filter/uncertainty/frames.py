@@ -13,7 +13,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.filter.contacts import stands_off_plates
 from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Geometry
-from dynakin.recordings.times import step_of
+from dynakin.recordings.times import at_the_ends, step_of
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import DERIVED, MEASURED, in_use, moment_sources, plates_refused
 
@@ -40,6 +40,7 @@ class Frames:
             second.
         used: (T, M) markers that show the posture (`in_use`).
         sources: (T, C) of the moments (`results.measures.sources`), `as_believed` where plates were refused.
+        ends: (T,) those `at_the_ends` of a recording, where later or earlier frames are missing.
         off_plates: whether some foot stands off the plates. late: whether later frames helped.
         variance_scale: of the noise that ``sd`` goes by.
     """
@@ -55,6 +56,7 @@ class Frames:
     segments: Sequence[str]
     used: Flags
     sources: npt.NDArray[np.uint8]
+    ends: Flags
     off_plates: bool
     late: bool
     variance_scale: float
@@ -84,6 +86,7 @@ class Frames:
             segments=segments,
             used=in_use(np.isfinite(values_of(data, "markers_measured")).any(axis=2), time),
             sources=np.where(plates_refused(data)[:, None], as_believed(sources), sources),
+            ends=at_the_ends(time),
             off_plates=any_off_plates(data, feet),
             late=late,
             variance_scale=variance_scale,

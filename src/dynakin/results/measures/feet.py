@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import rms, wrench_about
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
+from dynakin.recordings.times import at_the_ends
 from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.measures import sources
 from dynakin.results.naming import plural
@@ -40,7 +41,8 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         ``unknown_frames``: those in which a foot's wrench is derived, a prior, or not known; ``left_at_root``: the
         largest force (N) and moment about the root (N m) that no contact gives, ``grounded`` where all contacts are
         measured (each, or the sum of two; not where the plates were refused; there with its largest ``share`` of what
-        they give, or of the weight where that is more) and in ``flight``; ``verdict``.
+        they give, or of the weight where that is more; not `at_the_ends`, where accelerations are a guess) and in
+        ``flight``; ``verdict``.
     """
     if not estimate.foot_names or "foot_wrench" not in estimate.data:
         return None
@@ -53,6 +55,7 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     flight = (contact == NO_CONTACT).all(axis=1) & given
     grounded = (contact != UNMEASURED).all(axis=1) & (contact != NO_CONTACT).any(axis=1) & given
     grounded &= _nothing_else_bears(estimate)[window] & ~sources.plates_refused(estimate.data)[window]
+    inner = ~at_the_ends(estimate.time)[window]
     known = (contact == ON_PLATE) & grounded[:, None] & np.isfinite(adjusted).all(axis=2)  # not where it is lost
     adjustment = {
         name: _rms(COMPONENTS, adjusted[known[:, k], k]) if known[:, k].any() else None
@@ -62,7 +65,8 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     weight = GRAVITY_M_S2 * (estimate.mass_kg or 0.0)
     borne = np.linalg.norm(estimate.values("foot_wrench")[window, :, :3].sum(axis=1), axis=1)
     least = np.fmax(borne, weight or np.nan)
-    left = {"grounded": _largest(about_root[grounded], least[grounded]), "flight": _largest(about_root[flight])}
+    judged = grounded & inner
+    left = {"grounded": _largest(about_root[judged], least[judged]), "flight": _largest(about_root[flight])}
     figures = {
         "adjustment_rms": adjustment,
         "remainder_rms": _rms(COMPONENTS, remainder[flight]) if flight.any() else None,
