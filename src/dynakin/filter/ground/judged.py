@@ -53,9 +53,8 @@ def judged(on: OnGround) -> tuple[Ground, Array]:
     if on.check.unused:
         ground, nothing = judged(OnGround.of(on.trial.without_plates()))
         loads = ground.loads
-        if loads is not None:  # the recording keeps its plates, with nobody on any
-            nobody = np.zeros((len(nothing), len(loads.feet), len(on.trial.recording.plates)), dtype=bool)
-            loads = replace(loads, on=nobody)
+        if loads is not None and on.loads is not None:  # the recording keeps its plates, with nobody on any
+            loads = replace(loads, on=np.zeros_like(on.loads.on), plates=on.loads.plates)
         return replace(ground, loads=loads, notes=(*on.check.messages, *ground.notes)), nothing
     return _by_motion(on, on.check)
 
@@ -68,7 +67,8 @@ def _without_plates(on: OnGround) -> tuple[Ground, Array]:
     said, wrench = note("plates", text), on.trial.wrench
     initial, recording = on.trial.initial, on.trial.recording
     if on.loads is None or initial.contacts:
-        return Ground(on.loads, np.zeros(len(wrench), dtype=bool), on.may, notes=(said,), reasons=(said,)), wrench
+        none = np.zeros(len(wrench), dtype=bool)
+        return Ground(on.loads, none, on.may, usable=False, notes=(said,), reasons=(said,)), wrench
     beyond = beyond_the_feet(on.trial.needed)
     texts = [said]
     if beyond.any():
@@ -79,7 +79,7 @@ def _without_plates(on: OnGround) -> tuple[Ground, Array]:
         )
         texts.append(warning("plates", text))
     loads, reasons = on.loads.with_undeclared(beyond), tuple(texts)
-    return Ground(loads, beyond, on.may, notes=reasons, reasons=reasons), wrench
+    return Ground(loads, beyond, on.may, usable=False, notes=reasons, reasons=reasons), wrench
 
 
 def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
@@ -123,7 +123,7 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
         notes.append(note("plates", f"The total wrench is measured in {used} of {n} frames."))
     notes += reasons
     found = Ground(
-        loads, undeclared, carries.bears, errors, used > 0, carries.load_ratio, tuple(notes),
+        loads, undeclared, carries.bears, used > 0, errors, carries.load_ratio, tuple(notes),
         tuple(reasons), in_hands_kg=max(in_hands_kg, held_kg),
     )  # fmt: skip
     return found, wrench
