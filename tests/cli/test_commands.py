@@ -195,7 +195,7 @@ def test_run_replaces_its_own_output_and_draws_figures(data_dir: Path, tmp_path:
     assert main(["run", trial, *options, *figures]) == 0
     drawn = {entry.suffix for entry in (tmp_path / "figures").iterdir()}
     assert (tmp_path / "figures" / "figure3_sensitivity.svg").exists()
-    assert (tmp_path / "figures" / "repetitions.pdf").exists()
+    assert (tmp_path / "figures" / "repetitions_angles.pdf").exists()
     assert drawn == {".svg", ".pdf", ".png"} and str(tmp_path / "figures") in capsys.readouterr().out.replace("\n", "")
     written = {*OUTPUT_FILES, *OF_THE_BODY}
     assert {entry.name for entry in (tmp_path / "out").iterdir()} == written

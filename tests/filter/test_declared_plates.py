@@ -84,7 +84,7 @@ def test_a_shared_plate_measures_the_sum_of_what_is_on_it() -> None:
     assert loads.total_known.all() and loads.sharing == [HANDS]
     nothing = np.zeros(len(paths), dtype=bool)
     bears = np.zeros((len(paths), 2), dtype=bool)
-    found = expected_loads(Ground(loads, nothing, bears), initial, dynakin.presets.default(), paths)
+    found = expected_loads(Ground(loads, nothing, bears, usable=True), initial, dynakin.presets.default(), paths)
     assert (found.contact[:, 2:4] == SHARED_PLATE).all() and (found.contact[:, :2] == ON_PLATE).all()
     both = found.wrench[:, 2:4]
     np.testing.assert_allclose(both.sum(axis=1)[:, 1], 150.0, atol=1.0)

@@ -98,7 +98,7 @@ def expected(loads: FootLoads, undeclared: np.ndarray | None = None, **noise: fl
     n = len(loads.reason)
     asked = np.zeros(n, bool) if undeclared is None else undeclared
     chosen = NOISE.model_copy(update=noise) if noise else NOISE
-    bearing = Ground(loads, asked, np.zeros((n, 0), bool))
+    bearing = Ground(loads, asked, np.zeros((n, 0), bool), usable=True)
     return expected_loads(bearing, person(), chosen, np.tile(ROOT, (n, 1, 1)))
 
 
@@ -243,7 +243,7 @@ def test_a_plate_of_the_vertical_force_alone_leaves_the_rest_to_the_prior() -> N
     place = PRESSURE[0] + [0.02, 0.0, -0.01]
     loads.wrench[t, 0] = plate_wrench(410.0, place, (0.0, 0.0)) - [0.0, 0.0, 0.0, 0.0, 2.0, 0.0]
     n = len(REASONS)
-    bearing = Ground(loads, np.zeros(n, bool), np.zeros((n, 0), bool), PlateErrors(unmeasured=True))
+    bearing = Ground(loads, np.zeros(n, bool), np.zeros((n, 0), bool), True, PlateErrors(unmeasured=True))
     found = expected_loads(bearing, person(), NOISE, np.tile(ROOT, (n, 1, 1)))
     assert found.contact[t].tolist()[:2] == [UNMEASURED, UNMEASURED]
     prior = foot_prior(loads, 0, WEIGHT, np.tile(ROOT, (n, 1)), np.zeros(n, bool))

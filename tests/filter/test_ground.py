@@ -306,6 +306,7 @@ def test_plates_that_carry_nobody_are_as_none_and_warned_of() -> None:
     idle = [replace(p, force=0.0 * p.force, moment=0.0 * p.moment, cop=np.nan * p.cop) for p in walk.plates]
     found, none = (ground_of(walk.with_plates(plates), person("fullbody")) for plates in (tuple(idle), ()))
     assert found.loads is not None and none.loads is not None and not found.usable
+    assert [each.name for each in found.loads.plates] == [each.name for each in idle]
     np.testing.assert_array_equal(found.loads.reason, none.loads.reason)
     assert str(found.notes[0]).startswith("Warning: the plates carry nobody") and found.notes[1:] == none.notes
 

@@ -210,7 +210,7 @@ def _feet(recording: Recording, live: Tracker) -> ContactLoads:
     initial, markers = live.calibrated, marker_paths(recording, live.calibrated)
     loads = foot_loads(recording, initial.ground, initial.foot_markers)
     paths, nothing = ContactPaths.of(initial).at(markers), np.zeros((len(markers), 0), bool)
-    bearing = Ground(loads, np.zeros(len(markers), bool), nothing)
+    bearing = Ground(loads, np.zeros(len(markers), bool), nothing, usable=True)
     return expected_loads(bearing, initial, live.noise, paths)
 
 

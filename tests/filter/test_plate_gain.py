@@ -29,10 +29,10 @@ def said_of_gains(ready: Prepared) -> list[str]:
     return [message.text for message in about(ready.messages, "gain")]
 
 
-def off_gain(ready: Prepared) -> np.ndarray:
+def gain_error(ready: Prepared) -> np.ndarray:
     """(T, F)."""
     assert ready.ground.loads is not None
-    return ready.ground.errors.gain_of_feet(ready.ground.loads)
+    return ready.ground.errors.gain_error_of_feet(ready.ground.loads)
 
 
 @pytest.mark.parametrize("part", [0.9, 1.1])
@@ -41,11 +41,11 @@ def test_a_plate_of_another_gain_is_named_whatever_the_person_weighs(part: float
     recording = with_plate(trial("gait"), 1, scaled(part))
     ready, right = person(mass_kg=mass_kg).prepare(recording), prepared("gait", mass_kg=mass_kg)
     (text,) = said_of_gains(ready)
-    assert "plate 2 shows" in text and not said_of_gains(right) and not off_gain(right).any()
+    assert "plate 2 shows" in text and not said_of_gains(right) and not gain_error(right).any()
     assert float(text.split("plate 2 shows ")[1].split()[0]) == pytest.approx(part, abs=0.02)
     on = recording.plates[1].force[:, 1] > 20.0
-    assert off_gain(ready)[on].max(axis=1) == pytest.approx(abs(1.0 - 1.0 / part), abs=0.02)
-    assert not off_gain(ready)[~widened(on, 10)].any()
+    assert gain_error(ready)[on].max(axis=1) == pytest.approx(abs(1.0 - 1.0 / part), abs=0.02)
+    assert not gain_error(ready)[~widened(on, 10)].any()
     assert not any("something that no plate measures" in str(message) for message in ready.messages)
 
 
@@ -56,7 +56,7 @@ def test_a_declared_hand_is_not_what_a_plate_is_off_by(part: float, told: bool) 
     ready = person("hand_right").prepare(with_plate(trial("gait"), 1, scaled(part)))
     (said,) = about(ready.messages, "gain")
     assert "plate 2 shows" in said.text and (said in warnings_of(ready.messages)) == told
-    assert off_gain(ready).max() > 0.08
+    assert gain_error(ready).max() > 0.08
     assert not said_of_gains(prepared("gait", "hand_right"))
 
 
@@ -112,7 +112,7 @@ def test_of_two_plates_nobody_knows_which_is_wrong(data_dir: Path) -> None:
     one, other = (plate.name for plate in recording.plates)
     assert f"{one} or {other}" in text or f"{other} or {one}" in text
     both = np.stack([plate.force[:, 1] > 20.0 for plate in ready.recording.plates], axis=1).any(axis=1)
-    assert (off_gain(ready)[both].max(axis=1) > 0.05).mean() > 0.9
+    assert (gain_error(ready)[both].max(axis=1) > 0.05).mean() > 0.9
 
 
 @pytest.mark.parametrize("start_s", [0.9, 1.4, 1.9])
@@ -169,7 +169,7 @@ def test_what_a_gain_is_off_by_is_all_of_the_load_or_one_sensors() -> None:
     force = np.array([0.0, 800.0, 60.0])
     wrench = np.concatenate([force, np.cross(place, force)])
     there = carry(-place)
-    sd = np.sqrt(np.diag(there @ plate_covariances(wrench[None], place[None], off_gain=0.1)[0] @ there.T))
+    sd = np.sqrt(np.diag(there @ plate_covariances(wrench[None], place[None], gain_error=0.1)[0] @ there.T))
     np.testing.assert_allclose(sd[1], 80.0, rtol=0.02)
     np.testing.assert_allclose(sd[3:], 80.0 * SENSOR_M, rtol=0.02)
     np.testing.assert_allclose(sd[[0, 2]], np.hypot(np.hypot(2.0, 4.0), 6.0), rtol=1e-6)

@@ -323,7 +323,8 @@ def forward_of_squat() -> np.ndarray:
 
 def no_shear(errors: PlateErrors) -> bool:
     """Whether nothing is off, nor said, of the horizontal forces."""
-    return errors.zero == (0.0, 0.0) and errors.shear == 0.0 and not (errors.unmeasured or about(errors.said, "zero"))
+    none = errors.shear_zero_n == (0.0, 0.0) and errors.shear_gain_error == 0.0
+    return none and not (errors.unmeasured or about(errors.said, "zero"))
 
 
 @pytest.mark.parametrize("each_n", [0.0, 2.0, 12.0, 20.0])
@@ -358,7 +359,7 @@ def test_a_declared_contact_switches_no_check_off(contact: str, each_n: float, t
     said = about(ready.messages, "zero")
     assert len(said) == 1 and bool(warnings_of(said)) == told
     assert ready.ground.bears.all() == ready.ground.bears.any() == bears
-    assert np.hypot(*ready.ground.errors.zero) == pytest.approx(2.0 * each_n, abs=1.5)
+    assert np.hypot(*ready.ground.errors.shear_zero_n) == pytest.approx(2.0 * each_n, abs=1.5)
     assert not about(prepared("squat", contact).messages, "zero")
 
 
@@ -381,7 +382,7 @@ def test_an_error_of_the_motion_that_each_step_repeats_is_no_zero_of_the_plates(
     assert np.nanmean((needed.closed(force) - needed.force)[:, 0]) > zero_n + 9.0
     found = found_shear(needed, force)
     assert len(found.said) == (zero_n > 0.0)
-    np.testing.assert_allclose(found.zero, [zero_n, 0.0], atol=0.5)
+    np.testing.assert_allclose(found.shear_zero_n, [zero_n, 0.0], atol=0.5)
 
 
 @pytest.mark.parametrize(("gain", "told"), [(0.5, True), (0.9, False), (1.0, False), (1.5, True)])
@@ -391,7 +392,7 @@ def test_shear_of_another_gain_is_told(gain: float, told: bool) -> None:
     gains = np.where(np.arange(3) == up, 1.0, gain)
     ready = person().prepare(with_forces(walk, lambda force: force * gains))
     assert bool(about(ready.messages, "gain")) == told
-    assert (ready.ground.errors.shear > 0.3) == told
+    assert (ready.ground.errors.shear_gain_error > 0.3) == told
 
 
 def test_nothing_is_said_of_the_shear_of_real_plates(data_dir: Path) -> None:

@@ -34,9 +34,11 @@ def test_differences_to_the_reference_are_said_with_their_unit(saved: Path) -> N
     assert words_in(saved / "figure5_angles.svg").count("RMS difference 5.00 deg") == 7
     assert "AT 20.0 N m" in words_in(saved / "figure6_wrench.svg")
     assert re.search(r"RMS difference 10.0 N m, \d+ % of AT’s RMS", words_in(saved / "figure7_knee_moment.svg"))
-    repeated = words_in(saved / "repetitions.svg")
-    assert "% of the squat, n = 2" in repeated and repeated.count("N m/kg") == 8 and repeated.count("N/kg") == 3
-    assert all(name in repeated for name in ("EKF (paper)", "AT (6 Hz)", "measured", "± 1 standard deviation"))
+    moments, wrench = (words_in(saved / f"repetitions_{kind}.svg") for kind in ("moments", "wrench"))
+    both = moments + wrench
+    assert "% of the squat, n = 2" in wrench and both.count("N m/kg") == 8 and both.count("N/kg") == 3
+    assert all(name in wrench for name in ("EKF (paper)", "AT (6 Hz)", "measured", "± 1 standard deviation"))
+    assert "measured" not in moments  # the key is of what is drawn
 
 
 def test_lines_of_segments_are_named_where_they_end(saved: Path) -> None:
@@ -60,8 +62,10 @@ def test_formats_and_what_is_left_out(jointed: Estimate, tmp_path: Path) -> None
         "figure4_markers.png",
         "figure5_angles.pdf",
         "figure5_angles.png",
-        "repetitions.pdf",
-        "repetitions.png",
+        "repetitions_angles.pdf",
+        "repetitions_angles.png",
+        "repetitions_moments.pdf",
+        "repetitions_moments.png",
     ]
     assert written[0].read_bytes()[:4] == b"%PDF"
 

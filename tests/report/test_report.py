@@ -211,11 +211,11 @@ def with_innovations(estimate: Estimate, size: float, rng: np.random.Generator) 
     return replace(estimate, data=data.drop_vars("verdict", errors="ignore").assign(white | {"verdict": verdict}))
 
 
-def refusing(estimate: Estimate, frames: int, kind: EventKind = "gated") -> Insight:
-    """What is said where one marker is refused for a while."""
+def refusing(estimate: Estimate, frames: int, kind: EventKind = "gated", sensor: str = "") -> Insight:
+    """What is said where one marker, or another sensor, is refused for a while."""
     verdict = np.ones((len(estimate.time), len(estimate.marker_names) + 1), dtype=int)
     verdict[50 : 50 + frames, 2] = REFUSED
-    event = Event(0.5, 50, kind, estimate.marker_names[2], f"not used for {frames} frames")
+    event = Event(0.5, 50, kind, sensor or estimate.marker_names[2], f"not used for {frames} frames")
     data = estimate.data.drop_vars("verdict", errors="ignore").assign(verdict=(("time", "sensor"), verdict))
     made = replace(estimate, data=data, events=[event])
     return {insight.title: insight for insight in insights(made, compute_metrics(made))}["Left out or reset"]
@@ -225,6 +225,12 @@ def test_a_frame_of_one_marker_is_a_note_and_a_tenth_of_a_second_or_a_reset_a_wa
     assert refusing(estimate, 1).level == "note"
     assert refusing(estimate, 30).level == "warning"
     assert refusing(estimate, 1, "reset").level == "warning"
+
+
+def test_what_to_look_at_goes_by_what_was_refused(estimate: Estimate) -> None:
+    marker, plates = refusing(estimate, 1).advice, refusing(estimate, 1, sensor="plates").advice
+    assert "labels" in marker and "edge" not in marker
+    assert "edge" in plates and "labels" not in plates
 
 
 def test_advice_can_be_followed(estimate: Estimate) -> None:

@@ -13,7 +13,7 @@ import pytest
 import dynakin
 from dynakin.errors import ConfigError, OutputError
 from dynakin.filter.estimator import Estimator
-from dynakin.report.text_tables import table2_text
+from dynakin.report.text_tables import shown, table2_text
 from dynakin.results.measures.fit import SignalFit
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.validation.case import Setup
@@ -138,3 +138,7 @@ def test_squats1_filter_follows_the_plates_far_below_the_table(data_dir: Path) -
     for component, (ekf, least, most) in limits.items():
         assert (rows[component, "EKF (default)"] or np.inf) < ekf
         assert least < (rows[component, "AT (6 Hz)"] or 0.0) < most
+
+
+def test_what_rounds_to_nothing_has_no_sign() -> None:
+    assert shown(Spread(-0.02, None, 1), 1, "deg") == "0.0 deg" and shown(Spread(-0.2, 0.1, 2), 1) == "−0.2 ± 0.1"

@@ -158,6 +158,7 @@ def _stretches(
     events = []
     for first, end in runs(flags):
         n = end - first
-        text = f"{what} for {n} frame{'s' if n > 1 else ''}, {span(time, first, end)}"
+        when = span(time, first, end) if n > 1 else f"at {time[first]:.2f} s"
+        text = f"{what} for {n} frame{'s' if n > 1 else ''}, {when}"
         events.append(Event(float(time[first]), first, kind, subject, text))
     return events

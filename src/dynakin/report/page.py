@@ -185,4 +185,4 @@ def _cell(value: float | None, unit: str) -> str:
     factor, _ = shown_unit(unit)
     if value is None or factor == 1.0:
         return number(value)
-    return f"{factor * value:.1f}".replace("-0.0", "0.0").replace("-", "−")
+    return f"{factor * value:z.1f}".replace("-", "−")

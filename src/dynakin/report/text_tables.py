@@ -28,7 +28,7 @@ def shown(value: Spread, digits: int, unit: str = "") -> str:
     """Mean and, over several trials, standard deviation."""
     if value.mean is None:
         return "–"
-    text = f"{value.mean:.{digits}f}" + (f" ± {value.sd:.{digits}f}" if value.sd is not None else "")
+    text = f"{value.mean:z.{digits}f}" + (f" ± {value.sd:.{digits}f}" if value.sd is not None else "")
     return f"{text} {unit}".rstrip().replace("-", "−")
 
 

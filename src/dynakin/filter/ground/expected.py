@@ -115,9 +115,9 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
     each = np.arange(K)
     places = np.concatenate([loads.soles.middle, paths[:, 1:]], axis=1)
     places = np.where(np.isfinite(places), places, (root * [1.0, 0.0, 1.0])[:, None])
-    gains = np.zeros((frames, K))
-    gains[:, :F] = plates.gain_of_feet(loads)
-    by_plates = plate_covariances(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), plates, gains.reshape(-1))
+    gain_errors = np.zeros((frames, K))
+    gain_errors[:, :F] = plates.gain_error_of_feet(loads)
+    by_plates = plate_covariances(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), plates, gain_errors.reshape(-1))
     errors[:, each, :, each] = by_plates.reshape(frames, K, 6, 6).swapaxes(0, 1)
     for k in range(K):
         off = unmeasured[:, k]
@@ -140,7 +140,7 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
     for group in (range(F), *([F + own.index(name) for name in names] for names in loads.sharing)):
         shares = contact[:, group] == SHARED_PLATE
         for t in np.flatnonzero(shares.any(axis=1)):
-            _divide(int(t), np.asarray(group)[shares[t]], priors, wrench, errors, places, plates, gains)
+            _divide(int(t), np.asarray(group)[shares[t]], priors, wrench, errors, places, plates, gain_errors)
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -165,21 +165,21 @@ def residual_sd(noise: Noise, initial: CalibratedModel) -> Array:
 
 
 def plate_covariances(
-    wrench: Array, contact: Array, off: PlateErrors = NO_ERRORS, off_gain: Array | float = 0.0
+    wrench: Array, contact: Array, off: PlateErrors = NO_ERRORS, gain_error: Array | float = 0.0
 ) -> Array:
     """Covariances (T, 6, 6) about the ground's origin of what a plate says, (T, 6) about it too: at its centre of
     pressure on the level of the contact (T, 3) m, at that itself where the plate is hardly loaded.
 
     Args:
-        off_gain: (T,) part of its load by which the plate may be off, all of it or a sensor's `SENSOR_M` away.
+        gain_error: (T,) part of its load by which the plate may be off, all of it or a sensor's `SENSOR_M` away.
     """
     push, pressure = np.maximum(np.abs(wrench[:, 1]), LOADED_N), contact.copy()
     at = pressed_at(wrench, contact[:, 1])
     pressure[:, [0, 2]] = np.where(np.isnan(at), contact[:, [0, 2]], at)
     shear = np.hypot(np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), off.shear_sd(wrench))
-    shear = np.hypot(shear, off_gain * np.hypot(wrench[:, 0], wrench[:, 2]))
-    lift = np.hypot(PLATE_NOISE_N, np.hypot(PLATE_GAIN, off_gain) * push)
-    moment = np.hypot(PLATE_NOISE_NM, np.hypot(PLATE_PLACE_M, SENSOR_M * off_gain) * push)
+    shear = np.hypot(shear, gain_error * np.hypot(wrench[:, 0], wrench[:, 2]))
+    lift = np.hypot(PLATE_NOISE_N, np.hypot(PLATE_GAIN, gain_error) * push)
+    moment = np.hypot(PLATE_NOISE_NM, np.hypot(PLATE_PLACE_M, SENSOR_M * gain_error) * push)
     twist = shear if off.unmeasured else moment
     return _about(pressure, np.stack([shear, lift, shear, moment, twist, moment], axis=1))
 
@@ -249,11 +249,12 @@ def _divide(
     errors: Array,
     places: Array,
     plates: PlateErrors,
-    gains: Array,
+    gain_errors: Array,
 ) -> None:
     """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
-    plate = plate_covariances(wrench[t, feet].sum(axis=0)[None], places[t, feet[:1]], plates, gains[t, feet[:1]])[0]
+    first = feet[:1]
+    plate = plate_covariances(wrench[t, feet].sum(axis=0)[None], places[t, first], plates, gain_errors[t, first])[0]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
     root = np.linalg.cholesky(S)

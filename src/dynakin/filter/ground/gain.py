@@ -72,7 +72,7 @@ def found_gains(needed: Needed, plates: Sequence[Plate], wrenches: Array, known:
     push = smoothed(wrenches[:, :, 1].T, judged, needed.rate)[judged] / needed.weight
     need = smoothed(needed.force[:, [1]], judged, needed.rate)[judged, 0] / needed.weight
     bears = push.sum(axis=0) / needed.rate
-    off, factor, notes = np.zeros(len(plates)), np.ones(len(plates)), list[Message]()
+    gain_error, gain, notes = np.zeros(len(plates)), np.ones(len(plates)), list[Message]()
     own, rest = list[int](), list(range(len(plates)))
     while len(asked := [p for p in rest if bears[p] > LEAST_S]) > 1:
         apart = [each for p in asked if (each := _beside(push, need, p, own, rest, needed.rate)) is not None]
@@ -82,13 +82,13 @@ def found_gains(needed: Needed, plates: Sequence[Plate], wrenches: Array, known:
         if found.explained < EXPLAINED or not found.alike:  # something else bears, too, and may be what the others lack
             break
         plate, by, only_two = found.plate, float(np.exp(found.log)), len(asked) == 2
-        off[asked if only_two else plate] = abs(1.0 - 1.0 / by)
-        factor[plate] = 1.0 if only_two else by
+        gain_error[asked if only_two else plate] = abs(1.0 - 1.0 / by)
+        gain[plate] = 1.0 if only_two else by
         others = listed([plates[p].name for p in asked if p != plate])
         notes.append(warning("gain", _in_words(plates[plate].name, others, by, found.sd, only_two)))
         own.append(plate)
         rest.remove(plate)
-    return PlateErrors(gain=off, factor=factor, said=tuple(notes))
+    return PlateErrors(gain_error=gain_error, gain=gain, said=tuple(notes))
 
 
 def _in_words(plate: str, others: str, by: float, sd: float, only_two: bool) -> str:

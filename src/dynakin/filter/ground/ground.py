@@ -23,8 +23,8 @@ class Ground:
         undeclared: (T,) frames in which something bears or pulls the person that no plate measures (a seat, a rail, a
             cable), wherever it acts: of the moments only those between the plates and the thighs are known.
         bears: (T, C) frames in which each declared contact bears, or may, where no plate measures it.
-        errors: by how much more than usual the plates may be off.
         usable: whether the plates are used at all.
+        errors: by how much more than usual the plates may be off.
         load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
         notes: what there is to say. reasons: those of them that say why something is not measured.
         behind_s: by how much the plates lagged behind the markers and were brought into step. clock_sd_s: how far they
@@ -37,8 +37,8 @@ class Ground:
     loads: FootLoads | None
     undeclared: Flags
     bears: Flags
+    usable: bool
     errors: PlateErrors = NO_ERRORS
-    usable: bool = False
     load_ratio: float | None = None
     notes: tuple[Message, ...] = ()
     reasons: tuple[Message, ...] = ()

@@ -53,9 +53,8 @@ def judged(on: OnGround) -> tuple[Ground, Array]:
     if on.check.unused:
         ground, nothing = judged(OnGround.of(on.trial.without_plates()))
         loads = ground.loads
-        if loads is not None:  # the recording keeps its plates, with nobody on any
-            nobody = np.zeros((len(nothing), len(loads.feet), len(on.trial.recording.plates)), dtype=bool)
-            loads = replace(loads, on=nobody)
+        if loads is not None and on.loads is not None:  # the recording keeps its plates, with nobody on any
+            loads = replace(loads, on=np.zeros_like(on.loads.on), plates=on.loads.plates)
         return replace(ground, loads=loads, notes=(*on.check.messages, *ground.notes)), nothing
     return _by_motion(on, on.check)
 
@@ -68,7 +67,8 @@ def _without_plates(on: OnGround) -> tuple[Ground, Array]:
     said, wrench = note("plates", text), on.trial.wrench
     initial, recording = on.trial.initial, on.trial.recording
     if on.loads is None or initial.contacts:
-        return Ground(on.loads, np.zeros(len(wrench), dtype=bool), on.may, notes=(said,), reasons=(said,)), wrench
+        none = np.zeros(len(wrench), dtype=bool)
+        return Ground(on.loads, none, on.may, usable=False, notes=(said,), reasons=(said,)), wrench
     beyond = beyond_the_feet(on.trial.needed)
     texts = [said]
     if beyond.any():
@@ -79,7 +79,7 @@ def _without_plates(on: OnGround) -> tuple[Ground, Array]:
         )
         texts.append(warning("plates", text))
     loads, reasons = on.loads.with_undeclared(beyond), tuple(texts)
-    return Ground(loads, beyond, on.may, notes=reasons, reasons=reasons), wrench
+    return Ground(loads, beyond, on.may, usable=False, notes=reasons, reasons=reasons), wrench
 
 
 def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
@@ -123,7 +123,7 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
         notes.append(note("plates", f"The total wrench is measured in {used} of {n} frames."))
     notes += reasons
     found = Ground(
-        loads, undeclared, carries.bears, errors, used > 0, carries.load_ratio, tuple(notes),
+        loads, undeclared, carries.bears, used > 0, errors, carries.load_ratio, tuple(notes),
         tuple(reasons), in_hands_kg=max(in_hands_kg, held_kg),
     )  # fmt: skip
     return found, wrench
@@ -147,7 +147,7 @@ def _plate_errors(on: OnGround, loads: FootLoads, first: Carried | None) -> Plat
     if np.any(found.borne):
         return found
     gains = _gains(on, loads, free, first)
-    return replace(found, gain=gains.gain, factor=gains.factor, said=(*found.said, *gains.said))
+    return replace(found, gain_error=gains.gain_error, gain=gains.gain, said=(*found.said, *gains.said))
 
 
 def _rate_or_load(on: OnGround, total: Array, touched: Flags) -> PlateErrors | None:
@@ -175,11 +175,11 @@ def _shear(on: OnGround, loads: FootLoads, first: Carried | None, total: Array, 
         return shear
     whole = found_shear(needed, on.total(loads))
     near = acts_at(first.found, loads.total_known, pressed_at(on.trial.wrench), on.places, mean=True)
-    if any(whole.zero) and near < AT_PLATE:
+    if any(whole.shear_zero_n) and near < AT_PLATE:
         return whole  # the plates', whoever is declared
-    if not (any(shear.zero) and touched.any()):
+    if not (any(shear.shear_zero_n) and touched.any()):
         return shear
-    said = note("zero", held_in_words(not_zeroed(*shear.zero, needed.weight), on.trial.initial, touched))
+    said = note("zero", held_in_words(not_zeroed(*shear.shear_zero_n, needed.weight), on.trial.initial, touched))
     return replace(NO_ERRORS if near * AT_PLATE > 1.0 else shear, said=(said,), borne=touched)
 
 
@@ -189,13 +189,13 @@ def _gains(on: OnGround, loads: FootLoads, free: Flags, first: Carried | None) -
     gains = found_gains(needed, plates, wrenches, loads.total_known)
     if not gains.said or first is None or first.found is None or free[loads.total_known].all():
         return gains
-    off = [loads.plates[p] for p in np.flatnonzero(gains.gain)]
+    off = [loads.plates[p] for p in np.flatnonzero(gains.gain_error)]
     during = np.asarray(first.bears.any(axis=1))
     near = max(acts_at(first.found, during & own.loaded, own.cop, on.places) for own in off)
     if near < AT_PLATE:
         return gains
     if near * AT_PLATE < 1.0:  # nobody can tell
-        return replace(gains, factor=1.0, said=tuple(note("gain", each.text) for each in gains.said))
+        return replace(gains, gain=1.0, said=tuple(note("gain", each.text) for each in gains.said))
     return found_gains(needed, plates, wrenches, loads.total_known & free)
 
 

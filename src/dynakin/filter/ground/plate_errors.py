@@ -23,20 +23,21 @@ class PlateErrors:
     """What is wrong with P plates, as far as something contradicts them.
 
     Attributes:
-        zero: N, X and Z of the ground, all the time, of their sum. shear: part of any horizontal force.
+        shear_zero_n: N, X and Z of the ground, what the horizontal force of their sum reads too much all the time.
+        shear_gain_error: part of any horizontal force by which it may be off.
         unmeasured: no plate measures horizontal forces, nor the moment about the vertical.
-        gain: (P,) part of its load by which each plate may be off.
-        factor: (P,) what each says over what it should, as far as that is known; 1 of plates of which one is wrong and
+        gain_error: (P,) part of its load by which each plate may be off.
+        gain: (P,) what each says over what it should, as far as that is known; 1 of plates of which one is wrong and
             nobody knows which.
         said: what there is to say, of what looks like such errors, too.
         borne: (C,) declared contacts that it is laid to instead.
     """
 
-    zero: tuple[float, float] = (0.0, 0.0)
-    shear: float = 0.0
+    shear_zero_n: tuple[float, float] = (0.0, 0.0)
+    shear_gain_error: float = 0.0
     unmeasured: bool = False
-    gain: Array | float = 0.0
-    factor: Array | float = 1.0
+    gain_error: Array | float = 0.0
+    gain: Array | float = 1.0
     said: tuple[Message, ...] = ()
     borne: Flags | bool = False
 
@@ -45,23 +46,23 @@ class PlateErrors:
         where nothing bears on it."""
         if self.unmeasured:
             return np.full(len(wrench), ANY_N)
-        sd = np.hypot(np.hypot(*self.zero), self.shear * np.hypot(wrench[:, 0], wrench[:, 2]))
+        sd = np.hypot(np.hypot(*self.shear_zero_n), self.shear_gain_error * np.hypot(wrench[:, 0], wrench[:, 2]))
         return np.where(wrench[:, 1] > 0.0, sd, 0.0)
 
-    def gain_of_feet(self, loads: FootLoads) -> Array:
+    def gain_error_of_feet(self, loads: FootLoads) -> Array:
         """(T, F) part of its load by which what each foot stands on may be off."""
-        return np.asarray((loads.on * self.gain).max(axis=2, initial=0.0))
+        return np.asarray((loads.on * self.gain_error).max(axis=2, initial=0.0))
 
     def zeroed(self, wrench: Array) -> Array:
         """The sum over the plates (T, 6) without its zero."""
-        return np.asarray(wrench - np.array([self.zero[0], 0.0, self.zero[1], 0.0, 0.0, 0.0]))
+        return np.asarray(wrench - np.array([self.shear_zero_n[0], 0.0, self.shear_zero_n[1], 0.0, 0.0, 0.0]))
 
     def righted(self, total: Array, wrenches: Array) -> Array | None:
         """The sum (T, 6) of plates (P, T, 6) as it were had each the gain of the others; None where nothing differs, or
         nobody knows which plate is wrong."""
-        if np.all(self.factor == 1.0):
+        if np.all(self.gain == 1.0):
             return None
-        return np.asarray(total - np.tensordot(1.0 - 1.0 / self.factor, np.nan_to_num(wrenches), axes=1))
+        return np.asarray(total - np.tensordot(1.0 - 1.0 / self.gain, np.nan_to_num(wrenches), axes=1))
 
 
 NO_ERRORS = PlateErrors()

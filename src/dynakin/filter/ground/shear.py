@@ -43,8 +43,11 @@ def found_shear(needed: Needed, force: Array) -> PlateErrors:
             f"{GAIN[1]:g}. Deviations of moments hold the difference."
         )
         notes.append(warning("gain", text))
-    off = (0.0, 0.0) if zero is None else (float(zero[0]), float(zero[1]))
-    return PlateErrors(off, 0.0 if gain is None else abs(1.0 - 1.0 / gain), said=tuple(notes))
+    return PlateErrors(
+        shear_zero_n=(0.0, 0.0) if zero is None else (float(zero[0]), float(zero[1])),
+        shear_gain_error=0.0 if gain is None else abs(1.0 - 1.0 / gain),
+        said=tuple(notes),
+    )
 
 
 def not_zeroed(x: float, z: float, weight: float) -> str:

@@ -124,7 +124,8 @@ class LiveFeet:
             loads = self._closed(loads, time_s, markers, places, wrenches, bears)
         undeclared = loads.elsewhere & (wrenches is not None)
         self.whole = self._whole(loads, bears)
-        return expected_loads(Ground(loads, undeclared, bears, errors), self.initial, self.noise, paths)
+        ground = Ground(loads, undeclared, bears, wrenches is not None, errors)
+        return expected_loads(ground, self.initial, self.noise, paths)
 
     def _whole(self, loads: FootLoads, bears: Flags) -> bool:
         return bool(loads.total_known[0] and not bears.any() and not self._vertical)

@@ -20,7 +20,9 @@ BRIEF_S = 0.1
 # What to do, in the words of a laboratory.
 ADVICE = {
     "unseen": "Do not use the angles and moments of these segments' joints there, or fill the gap from what you know.",
-    "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
+    "markers": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
+    "plates": "Look at the plates at these times: a foot on an edge, on two plates or half beside one, something else "
+    "on a plate; else their zero, and whether their clock is the markers'.",
 }
 
 
@@ -57,7 +59,9 @@ def gated(estimate: Estimate, metrics: Metrics) -> Insight | None:
     shown = [e.message if not e.subject or e.subject in e.message else f"{e.subject} {e.message}" for e in refused]
     sensors = all(event.kind == "gated" and event.subject != "motion" for event in refused)
     level: Level = "note" if sensors and _briefly(estimate) else "warning"
-    return Insight(level, "Left out or reset", f"{listed(shown, 4)}.", ADVICE["left out"])
+    plates = [event.subject == "plates" for event in refused]
+    advice = [ADVICE["markers"]] * (not all(plates)) + [ADVICE["plates"]] * any(plates)
+    return Insight(level, "Left out or reset", f"{listed(shown, 4)}.", " ".join(advice))
 
 
 def _briefly(estimate: Estimate) -> bool:

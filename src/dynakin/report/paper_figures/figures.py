@@ -24,6 +24,7 @@ from dynakin.report.paper_figures.movement import (
 from dynakin.report.paper_figures.parameters import inertias_figure, lengths_and_masses_figure
 from dynakin.report.paper_figures.saving import FORMATS, save_each
 from dynakin.report.paper_figures.sensitivity import Sensitivity, sensitivity_figure
+from dynakin.report.sections.repetitions import KINDS
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
@@ -37,7 +38,7 @@ FIGURES: dict[str, Draw] = {
     "figure7_knee_moment": knee_moment_figure,
     "figure8_lengths_and_masses": lengths_and_masses_figure,
     "figure9_inertias": inertias_figure,
-    "repetitions": repetitions_figure,
+    **{f"repetitions_{kind}": partial(repetitions_figure, kind=kind) for kind in KINDS},
 }
 """File name -> what draws it; it gives None where the estimate has nothing to show."""
 SENSITIVITY_FIGURE = "figure3_sensitivity"

@@ -18,7 +18,8 @@ from dynakin.report.chart import band_is_too_wide
 from dynakin.report.figure import draw_sourced
 from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.sections.repetitions import (
-    KINDS,
+    LEAST_PER_KG,
+    LEAST_RANGE,
     ONE_SD,
     Plot,
     curve_unit,
@@ -27,6 +28,7 @@ from dynakin.report.sections.repetitions import (
     note_of,
     percent_label,
     plots_by_method,
+    side_plots,
 )
 from dynakin.report.sides import joints_of, side_lines
 from dynakin.report.styles import BAND, ESTIMATED, INK, MEASURED, QUIET, LineStyle, method_styles, source_key
@@ -249,35 +251,55 @@ def _key(
     figure.legend(handles=handles, loc="outside upper left", ncols=columns, borderaxespad=0.2, columnspacing=1.6)
 
 
-_COLUMNS = 4
+_COLUMNS = 3
 
 
-def repetitions_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure | None:
-    """Joint angles, moments and wrench over 0 to 100 % of a repetition: mean, and one standard deviation as a band."""
+def repetitions_figure(
+    estimate: Estimate, comparison: ComparedTrial | None = None, *, kind: str = "angles"
+) -> Figure | None:
+    """Joint angles, moments or wrench over 0 to 100 % of a repetition: mean, and one standard deviation as a band.
+
+    As in the report: in a plane by method, in space legs and trunk, right and left over each other. Left out is what
+    moves by less than a panel's axis spans at least (`LEAST_RANGE`).
+
+    Args:
+        kind: one of `KINDS`.
+    """
     curves = estimate_curves(estimate) if comparison is None else comparison.curves()
-    plots = plots_by_method(estimate, curves)
+    every = plots_by_method(estimate, curves) if estimate.planar else side_plots(estimate, curves)[0][kind]
+    plots = [plot for plot in every if kind_of(plot.curves[0][1]) == kind and _shows(plot)]
     if not plots:
         return None
-    rows = [
-        kept[k : k + _COLUMNS]
-        for kind in KINDS
-        if (kept := [plot for plot in plots if kind_of(plot.curves[0][1]) == kind])
-        for k in range(0, len(kept), _COLUMNS)
-    ]
-    figure = Figure(figsize=(7.2, 0.55 + 1.5 * len(rows)), layout="constrained")
-    places = figure.subplots(len(rows), _COLUMNS, squeeze=False)
-    for row, panels in zip(rows, places, strict=True):
-        for axes in panels[len(row) :]:
-            axes.set_visible(False)
-        for plot, axes in zip(row, panels, strict=False):
-            _mean_curves(axes, plot)
-            titles = (plot.title, note_of(estimate, plot.curves[0][1]))
-            axes.set_title("\n".join(textwrap.fill(text, 24) for text in titles if text), fontsize=7.5)
-    n = int(max(curve.n.max() for curve in curves))
-    figure.supxlabel(f"{percent_label(curves[0].movement)}, n = {n}", fontsize=8, color=QUIET)
-    styles = method_styles(dict.fromkeys(curve.method for curve in curves)).values()
-    _key(figure, figure.axes[0], list(styles), band=ESTIMATED if n > 1 else "", what=ONE_SD, columns=5)
+    rows = -(-len(plots) // _COLUMNS)
+    figure = Figure(figsize=(7.2, 0.55 + 1.5 * rows), layout="constrained")
+    panels = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
+    for axes in panels[len(plots) :]:
+        axes.set_visible(False)
+    for plot, axes in zip(plots, panels, strict=False):
+        _mean_curves(axes, plot)
+        titles = (plot.title, note_of(estimate, plot.curves[0][1]))
+        axes.set_title("\n".join(textwrap.fill(text, 28) for text in titles if text), fontsize=7.5)
+    shown = [curve for plot in plots for _, curve in plot.curves]
+    n = int(max(curve.n.max() for curve in shown))
+    figure.supxlabel(f"{percent_label(shown[0].movement)}, n = {n}", fontsize=8, color=QUIET)
+    styles = {style.label: style for plot in plots for style, _ in plot.curves}
+    key = [replace(style, label=label or "middle") for label, style in styles.items()]
+    _key(figure, panels[0], key, band=_band_colour(key) if n > 1 else "", what=ONE_SD, columns=5)
     return figure
+
+
+def _band_colour(styles: Sequence[LineStyle]) -> str:
+    """The one that has a band; where several have, none of theirs."""
+    colours = {style.colour for style in styles if style.band}
+    return colours.pop() if len(colours) == 1 else QUIET
+
+
+def _shows(plot: Plot) -> bool:
+    """Whether any of its curves moves by more than the panel's axis spans at least."""
+    least = LEAST_RANGE.get(plot.curves[0][1].unit, LEAST_PER_KG)
+    return any(
+        np.nanmax(mean) - np.nanmin(mean) >= least for mean, _ in (drawn(c) for _, c in plot.curves if c.n.any())
+    )
 
 
 def _mean_curves(axes: Axes, plot: Plot) -> None:

@@ -12,7 +12,7 @@ from dynakin.report.body import colours_of
 from dynakin.report.labels import signed_percent
 from dynakin.report.styles import LIMIT, QUIET, thin
 from dynakin.results.estimate import Estimate
-from dynakin.results.naming import number, shown_unit, words
+from dynakin.results.naming import listed, number, shown_unit, words
 from dynakin.results.records import Parameter
 from dynakin.validation.methods import ComparedTrial
 
@@ -62,7 +62,7 @@ def _figure(estimate: Estimate, groups: dict[str, list[Parameter]]) -> Figure | 
 
 def _changes(axes: Axes, estimate: Estimate, parameters: list[Parameter]) -> None:
     colours, labels = colours_of(estimate), []
-    bounds: list[float] = []
+    bounds: list[tuple[float, Parameter]] = []
     reached = 1.0
     changes: list[tuple[Parameter, np.ndarray, np.ndarray, np.ndarray]] = []
     for p in parameters:
@@ -87,24 +87,41 @@ def _changes(axes: Axes, estimate: Estimate, parameters: list[Parameter]) -> Non
                 linewidth=0,
             )
         axes.plot(time, change, color=colour, linewidth=1.4)
-        bounds += [scale * (bound - p.initial) for bound in (p.lower, p.upper) if bound is not None]
+        bounds += [(scale * (bound - p.initial), p) for bound in (p.lower, p.upper) if bound is not None]
         labels.append((_label(p), float(change[-1]), colour))
     axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
     axes.set_ylim(-1.18 * reached, 1.18 * reached)
-    for bound in sorted({round(bound, 6) for bound in bounds if abs(bound) <= 1.05 * reached}):
+    _draw_bounds(axes, [(bound, p) for bound, p in bounds if abs(bound) <= 1.05 * reached])
+    axes.axhline(0.0, color=QUIET, linewidth=0.6)
+    _label_ends(axes, labels)
+
+
+def _draw_bounds(axes: Axes, bounds: Sequence[tuple[float, Parameter]]) -> None:
+    """Dashed lines; those that lie so near each other that their words would overprint have one label. Call it after
+    the limits are set."""
+    low, high = axes.get_ylim()
+    gap = 1.6 * _LABEL_PT / 72.0 / _PANEL_IN * (high - low)
+    near: list[list[tuple[float, Parameter]]] = []
+    for bound, p in sorted(bounds, key=lambda each: each[0]):
         axes.axhline(bound, color=LIMIT, linewidth=0.9, linestyle=(0, (5, 3)))
+        if near and bound - near[-1][0][0] < gap:
+            near[-1].append((bound, p))
+        else:
+            near.append([(bound, p)])
+    for group in near:
+        up = group[0][0] > 0.0
+        ends = dict.fromkeys(f"{bound:+z.0f}".replace("-", "−") for bound in (group[0][0], group[-1][0]))
+        whose = listed(list(dict.fromkeys(words(p.segment) for _, p in group)), 4)
         axes.annotate(
-            f"bound {bound:+z.0f} %".replace("-", "−"),
-            (0.01, bound),
+            f"bound {' to '.join(ends)} %: {whose}",
+            (0.01, group[-1 if up else 0][0]),
             xycoords=("axes fraction", "data"),
-            xytext=(0, 2 if bound > 0 else -2),
+            xytext=(0, 2 if up else -2),
             textcoords="offset points",
-            va="bottom" if bound > 0 else "top",
+            va="bottom" if up else "top",
             color=LIMIT,
             fontsize=7,
         )
-    axes.axhline(0.0, color=QUIET, linewidth=0.6)
-    _label_ends(axes, labels)
 
 
 def _label(p: Parameter) -> str:

@@ -21,6 +21,9 @@ from dynakin.units import COMPONENTS
 
 KINDS = {"angles": "Coordinates", "moments": "Moments, per kg", "wrench": "Ground reaction, per kg"}
 ONE_SD = "± 1 standard deviation"
+LEAST_RANGE = {"deg": 2.0, "mm": 10.0}
+LEAST_PER_KG = 0.02
+"""Range of a panel's axis at least, by the unit of its curves; of moments and forces, N m/kg and N/kg."""
 
 
 @dataclass(frozen=True)
@@ -44,25 +47,29 @@ def repetition_section(page: Page) -> Section:
 def side_repetitions(estimate: Estimate, found: Found, curves: Sequence[MeanCurve]) -> Section:
     """The filter's curves of legs and trunk and of the wrench, each limb over its own foot's cycles; or why there are
     none."""
-    own = [curve for curve in curves if curve.method.startswith("EKF")]
-    if not own:
+    if not any(curve.method.startswith("EKF") for curve in curves):
         return Section("repetitions", "Repetitions", "", notes=(found.note,))
+    plots, missing = side_plots(estimate, curves)
+    more = " All curves are in repetitions.csv."
+    more += f" No cycle is left of the moments of {listed(missing, 12)}." if missing else ""
+    keys = dict.fromkeys(KINDS, side_key(estimate)) | {"wrench": (MEASURED_LINE, ESTIMATED_LINE)}
+    return _section(found, plots, keys, more=more)
+
+
+def side_plots(estimate: Estimate, curves: Sequence[MeanCurve]) -> tuple[dict[str, list[Plot]], list[str]]:
+    """The same by kind, and the joints of whose moments no cycle is left."""
+    own = {(curve.side, curve.quantity): curve for curve in curves if curve.method.startswith("EKF")}
     joints = [joint for joint in joints_of(estimate) if joint.region in ("Legs", "Trunk and head")]
-    by_quantity, styles = {(curve.side, curve.quantity): curve for curve in own}, side_lines(estimate)
-    ways = reported(estimate).way
-    angles = [_sides(joint, by_quantity, "", styles, ways) for joint in joints]
-    moments = {joint.name.lower(): _sides(joint, by_quantity, "/moment", styles, ways) for joint in joints}
+    styles, ways = side_lines(estimate), reported(estimate).way
+    angles = [_sides(joint, own, "", styles, ways) for joint in joints]
+    moments = {joint.name.lower(): _sides(joint, own, "/moment", styles, ways) for joint in joints}
     wrench = [curve for curve in curves if curve.quantity in COMPONENTS and curve.method.startswith(("EKF", MEASURED))]
-    missing = [name for name, plot in moments.items() if plot is None]
     plots = {
         "angles": [plot for plot in angles if plot],
         "moments": [plot for plot in moments.values() if plot],
         "wrench": plots_by_method(estimate, wrench),
     }
-    more = " All curves are in repetitions.csv."
-    more += f" No cycle is left of the moments of {listed(missing, 12)}." if missing else ""
-    keys = dict.fromkeys(KINDS, side_key(estimate)) | {"wrench": (MEASURED_LINE, ESTIMATED_LINE)}
-    return _section(found, plots, keys, more=more)
+    return plots, [name for name, plot in moments.items() if plot is None]
 
 
 def method_repetitions(
@@ -193,7 +200,7 @@ def _panel(plot: Plot) -> Panel:
         band = 0.5 * sd if style.band and curve.n.max() > 1 else None  # a chart's band is two wide
         lines.append(Line(mean, style.colour, style.width, band, dashes=style.dashes))
     first = plot.curves[0][1]
-    least = {"deg": 2.0, "mm": 10.0}.get(first.unit, 0.02)
+    least = LEAST_RANGE.get(first.unit, LEAST_PER_KG)
     label = percent_label(first.movement)
     return chart(plot.title, curve_unit(first), PERCENT, lines, note=plot.note, least_range=least, x_label=label)
 

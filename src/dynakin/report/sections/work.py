@@ -123,8 +123,8 @@ def _compared(found: Mapping[str, Any]) -> str:
 def _percent(value: float | None, small: bool = False) -> str:
     if value is None:
         return "–"
-    text = f"{value:+.0f}".replace("-", "−")
-    text = "0" if text in ("+0", "−0") else text
+    text = f"{value:+z.0f}".replace("-", "−")
+    text = "0" if text == "+0" else text
     return f"({text})" if small else text
 
 
