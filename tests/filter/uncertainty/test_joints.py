@@ -122,6 +122,15 @@ def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_o
         assert np.sqrt(parts[kind]["moments"][9]) < 1.0
 
 
+def test_an_origin_that_lies_elsewhere_in_the_pelvis_travels_otherwise_as_it_tilts() -> None:
+    q, still = np.zeros(10), np.zeros(10)
+    q[3] = 0.6
+    parts = parts_of(systematic(), q, still, still)["root_origin"]
+    expected = np.linalg.norm(rotation(0.6 * Z) - np.eye(3), axis=1)
+    np.testing.assert_allclose(np.sqrt(parts["coordinates"][:3]), expected, rtol=0.02, atol=1e-3)
+    assert parts["coordinates"][3:].max() < 1e-3 and np.sqrt(parts["moments"][6:].max()) < 1e-6
+
+
 def test_a_knee_that_rolls_more_the_more_it_is_bent_errs_as_one_that_is_changed() -> None:
     """No angle errs where it is straight."""
     person = calibrated()

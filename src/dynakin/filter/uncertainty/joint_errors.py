@@ -31,14 +31,15 @@ Kind = Literal[
     "shoulder_axes",
     "root_frame",
     "frame_tilt",
+    "root_origin",
 ]
 """The centre of a joint with one or two axes (hinge) off where it is on its bones, or with three (ball; the spine's)
 within its parent's sagittal plane and across that; its one axis, two or three turned on both bones, or those of what
 hangs on the trunk and bears another joint; the root's frame turned in its bone, about its third axis (tilt, the trunk's
-as well) or another."""
+as well) or another, or its origin elsewhere in it."""
 BALLS: tuple[Kind, ...] = ("ball_centre", "ball_across")
 """Centres of joints with three axes that are not the spine's."""
-OF_FRAMES: tuple[Kind, ...] = ("root_frame", "frame_tilt")
+OF_FRAMES: tuple[Kind, ...] = ("root_frame", "frame_tilt", "root_origin")
 """What moves no marker beside its bone."""
 Column = dict[str, float]
 
@@ -159,7 +160,8 @@ def _turning(spec: _core.ModelSpec) -> dict[str, set[str]]:
 
 def _with_errors(spec: _core.ModelSpec) -> tuple[_core.ModelSpec, list[str]]:
     """Each segment may be displaced in its parent; a joint's axes may be turned in the parent, and the segment behind
-    them: three translations and three rotations before the joint, three rotations behind its own."""
+    them: three translations and three rotations before the joint, three rotations behind its own; of the root, whose
+    origin may be elsewhere in its bone, three translations behind them."""
     joints, added = _turning(spec), []
     larger = copy(spec)
     segments, coordinates = larger.segments, larger.coordinates
@@ -176,6 +178,7 @@ def _with_errors(spec: _core.ModelSpec) -> tuple[_core.ModelSpec, list[str]]:
             last = max(k for k, axis in enumerate(axes) if axis.kind == "rotation")
             axes[last + 1 : last + 1] = errors(name, "behind", "rotation")
             axes[:0] = errors(name, "turned", "rotation") if inner else []
+            axes += errors(name, "shifted", "translation") if not inner else []
         axes[:0] = errors(name, "moved", "translation") if inner else []
         segment.axes = axes
         segment.inertia_estimated = [bool(segment.inertia[0] > 0.0) and each in _FIRST for each in INERTIA_NAMES]
@@ -209,6 +212,7 @@ def _sources(
                 kinds: tuple[Kind, ...] = ("root_frame", "root_frame", "frame_tilt")
                 roots = [_frame_turned(name, R_B, jointed, e) for e in R_B.T]
                 found += [(kind, name, column) for kind, column in zip(kinds, roots, strict=True)]
+                found += [("root_origin", name, {axis: 1.0}) for axis in _names(name, "shifted")]
             continue
         R_J = orientations[segment.parent] @ segment.rotation
         own = {axis.coordinate for axis in segment.axes if axis.kind == "rotation"}

@@ -33,6 +33,7 @@ class Sizes:
         shoulder_axes: rad, of the turn of a shoulder's, whose arm shows little of how it is turned about itself.
         root_frame, frame_tilt: rad, of the turn of the pelvis' frame in the pelvis about its first two axes, and about
             the third (to the side); the trunk's in the trunk about its third.
+        root_origin: m, of the place of the pelvis' origin in the pelvis, of each component.
         roll: m/rad^2, of how far the centre of a joint moves with the square of its angle (knees'), where the model
             has it move with the angle.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
@@ -67,6 +68,7 @@ class Sizes:
     shoulder_axes: float
     root_frame: float
     frame_tilt: float
+    root_origin: float
     roll: float
     skin: float
     mass_centre: float
@@ -102,6 +104,7 @@ LANDMARKS = Sizes(
     shoulder_axes=np.radians(4.0),
     root_frame=np.radians(1.0),
     frame_tilt=np.radians(5.0),
+    root_origin=0.015,
     roll=0.0041,
     skin=0.085,
     mass_centre=0.012,
@@ -152,6 +155,7 @@ SCALED = Sizes(
     shoulder_axes=np.radians(1.3),
     root_frame=np.radians(0.9),
     frame_tilt=np.radians(0.9),
+    root_origin=0.0,
     roll=0.0,
     skin=0.08,
     mass_centre=0.003,
