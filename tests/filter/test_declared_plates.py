@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 import dynakin
+from dynakin.errors import ConfigError
 from dynakin.filter.ground.declared import low_beside_feet, plates_of_their_own
 from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.ground.ground import Ground
+from dynakin.filter.ground.known import known_ground
 from dynakin.filter.samples import marker_paths
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.assignment import foot_loads
@@ -121,3 +123,13 @@ def test_a_declared_hand_low_over_a_foots_plate_may_press_it_too() -> None:
     beside[110:120, 0] = True  # the plates lack what it bears: it is beside them
     assert low_beside_feet(initial, squat.time, loads, low, beside, [0, 1])[0] is loads
     assert low_beside_feet(initial, squat.time, loads, paths[:, 1:], nothing, [0, 1])[0] is loads
+
+
+@pytest.mark.parametrize(("owner", "who"), [("left", "the left foot is"), ("hand_right", "hand_right is")])
+def test_a_foots_plate_that_is_given_to_another_is_refused(owner: str, who: str) -> None:
+    squat, initial, _, _ = by_hands()
+    name = squat.plates[0].name
+    paths = marker_paths(squat, initial, gaps=True)
+    known_ground(squat, initial, paths, {name: "right"})
+    with pytest.raises(ConfigError, match=rf'plates: "{name}" is given to "{owner}", but {who} .* m from its centre'):
+        known_ground(squat, initial, paths, {name: owner})

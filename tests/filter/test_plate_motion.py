@@ -7,6 +7,8 @@ from collections.abc import Callable
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -16,9 +18,10 @@ from dynakin import Estimator, Subject, load_model
 from dynakin.cli.check_rows import model_rows
 from dynakin.errors import RecordingError
 from dynakin.filter.ground import axes
-from dynakin.filter.ground.carried import _taken_up, more_than_the_mass
+from dynakin.filter.ground.carried import _presses_there, _taken_up, more_than_the_mass
 from dynakin.filter.ground.delay import Delay, brought_into_step, plates_delay
 from dynakin.filter.ground.fine_delay import UNKNOWN_S
+from dynakin.filter.ground.mass_centre import MassCentre
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_errors import PlateErrors
 from dynakin.filter.ground.shear import found_shear
@@ -204,8 +207,9 @@ def test_plates_of_a_real_walk_off_their_place(data_dir: Path, by_m: float, told
     assert not told or "(X +0.0" in found[0]
 
 
-def holding(recording: Recording, mass_kg: float) -> Recording:
-    """With the force of so much in both hands, half of it under each foot."""
+def holding(recording: Recording, mass_kg: float, *, acts_there: bool = True) -> Recording:
+    """With the force of so much in both hands, half of it on each plate, acting where the hands are, or only under the
+    feet."""
     own = [k for k, name in enumerate(recording.marker_names) if "wrist" in name]
     at = low_pass(recording.markers[:, own].mean(axis=1), recording.rate, 6.0)
     step = 1.0 / recording.rate
@@ -214,7 +218,9 @@ def holding(recording: Recording, mass_kg: float) -> Recording:
 
     def of(plate: Plate) -> Plate:
         more = 0.5 * push
-        return replace(plate, force=plate.force + more, moment=plate.moment + np.cross(plate.cop, more))
+        return replace(
+            plate, force=plate.force + more, moment=plate.moment + np.cross(at if acts_there else plate.cop, more)
+        )
 
     return recording.with_plates(tuple(of(plate) for plate in recording.plates))
 
@@ -240,6 +246,33 @@ def test_what_is_carried_in_the_hands_is_said(mass_kg: float) -> None:
     if said:
         (found,) = re.findall("as if about ([0-9]+) kg were carried in the hands", said[0])
         assert abs(int(found) - mass_kg) < 3.0
+
+
+def test_a_load_in_the_hands_also_presses_where_these_are() -> None:
+    """A squat with the arms held forward, and nothing in them, was said to carry 6 kg: by 4 N, while 0.045 m of the
+    centre of pressure were lacking."""
+    who = Subject(mass_kg=94.0, height_m=1.75, sex="male")
+    ready = Estimator(load_model("fullbody", who)).prepare(holding(trial("squat"), 24.0, acts_there=False))
+    assert not about(ready.messages, "carried")
+
+
+@pytest.mark.parametrize(
+    ("carried_kg", "reach_m", "off_m", "there"),
+    [
+        (6.0, 0.5, 0.0, True),
+        (6.0, 0.5, -0.015, True),  # the model's centre of mass is off by so much
+        (0.0, 0.5, 0.0, False),
+        (0.0, 0.5, 0.015, False),
+        (0.0, 0.2, 0.0, True),  # too near to tell
+    ],
+)
+def test_where_a_load_in_the_hands_presses(carried_kg: float, reach_m: float, off_m: float, there: bool) -> None:
+    still = np.zeros((50, 3))
+    body, hands = (np.tile([along, up, 0.0], (50, 1)) for along, up in ((0.0, 1.0), (reach_m, 1.2)))
+    pressed = np.full((50, 2), [carried_kg / 70.0 * reach_m + off_m, 0.0])
+    centre = MassCentre(body, still, np.ones(50, dtype=bool))
+    needed = cast(Needed, SimpleNamespace(centre=centre, initial=SimpleNamespace(weighed_kg=70.0)))
+    assert _presses_there(needed, centre.known, pressed, hands, still, 6.0) == there
 
 
 @pytest.mark.parametrize(

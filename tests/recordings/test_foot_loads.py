@@ -203,6 +203,36 @@ def test_a_user_knows_better_and_a_load_where_nobody_stands_is_said() -> None:
         foot_loads(walker({}, plates), LABORATORY, MARKERS, assigned={"d": "right"})
 
 
+def test_a_plate_that_is_given_to_the_foot_beside_it_is_not_believed() -> None:
+    """A declared foot was never held against the centre of pressure: knees were 123 N m off, said to 11."""
+    push = np.full(T, 300.0)
+    plates = (plate("a", push, at(0.0, -0.1)), plate("b", push, at(0.0, 0.1)))
+    right = foot_loads(walker({}, plates), LABORATORY, MARKERS, assigned={"a": "left", "b": "right"})
+    assert not right.misgiven and right.all_measured.all()
+    wrong = foot_loads(walker({}, plates), LABORATORY, MARKERS, assigned={"a": "right", "b": "left"})
+    assert wrong.misgiven.startswith(
+        'plates: "a" is given to "right", but the right foot is 0.20 m from its centre of pressure and the left foot '
+        "stands there"
+    )
+
+
+@pytest.mark.parametrize("to_the_other_m", [0.0, 0.1])
+def test_a_plate_off_its_place_that_is_given_to_the_foot_on_it_is_believed(to_the_other_m: float) -> None:
+    push = np.full(T, 300.0)
+    plates = (plate("a", push, at(0.0, to_the_other_m - 0.1)), plate("b", push, at(0.0, 0.1 - to_the_other_m)))
+    loads = foot_loads(walker({}, plates), LABORATORY, MARKERS, assigned={"a": "left", "b": "right"})
+    assert not loads.misgiven and loads.on[:, [1, 0], [0, 1]].all()
+
+
+def test_a_press_of_the_other_foot_on_a_plate_that_is_given_is_not_the_given_foots() -> None:
+    push = np.where((np.arange(T) > 250) & (np.arange(T) < 280), 0.0, 300.0)
+    places = at(0.0, -0.1)
+    places[280:, 2] = 0.1
+    loads = foot_loads(walker({}, (plate("a", push, places),)), LABORATORY, MARKERS, assigned={"a": "left"})
+    assert not loads.misgiven and loads.on[:250, 1, 0].all() and not loads.on[280:].any()
+    assert any("where the foot that it is given to does not stand" in text.text for text in loads.messages)
+
+
 def test_real_plates(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
     squat = read(folder / "squats1.trc", folder / "squats1_grf.mot")

@@ -295,7 +295,9 @@ def _check_pressure(
     medians = {foot: float(np.nanmedian(d)) for foot, d in distances.items() if np.isfinite(d).any()}
     if not medians:
         return None
-    foot = owner if owner in medians else min(medians, key=lambda name: medians[name])
+    foot = min(medians, key=lambda name: medians[name])
+    if owner in medians and medians[owner] <= NEAR_M:
+        foot = owner
     nearest = np.fmin.reduce([distances[name] for name in medians])
     # While nobody stands still one plate may carry one foot after the other: each frame's nearest foot
     # counts.

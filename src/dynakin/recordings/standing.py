@@ -15,13 +15,13 @@ m/s, the slowest phases of a slow squat reach this only for instants at its turn
 MIN_STILL_S = 0.5
 """Shortest stretch that counts, so that a squat's turning point does not."""
 
-_SPAN_S = 0.1  # speeds are taken over this span, so that 1 mm of marker noise counts as 0.01 m/s only
+SPAN_S = 0.1  # speeds are taken over this span, so that 1 mm of marker noise counts as 0.01 m/s only
 
 
 def marker_velocities(recording: Recording) -> Array:
     """Velocity of each marker (T, M, 3) m/s, laboratory frame, over 0.1 s around each frame, less where a gap is nearer
     than that or the recording ends; NaN where it is not seen, or for one frame only."""
-    half = max(1, round(0.5 * _SPAN_S * recording.rate)) if recording.n_frames > 1 else 0
+    half = max(1, round(0.5 * SPAN_S * recording.rate)) if recording.n_frames > 1 else 0
     frames = np.arange(recording.n_frames)[:, None]
     first_seen, last_seen = _seen_without_break(np.asarray(np.isfinite(recording.markers).all(axis=2)))
     before, after = np.maximum(frames - half, first_seen), np.minimum(frames + half, last_seen)

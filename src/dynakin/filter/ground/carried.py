@@ -19,6 +19,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
 HEAVY_KG, FOLLOWS, JUDGED_S = 2.0, 0.8, 2.0
 """Mass in both hands, and the part of the excess' variance that its acceleration explains. Chosen on simulated squats
@@ -29,6 +30,11 @@ HELD_S = 1.0
 have no mean over it. The two limits above hold for it, too: one lift with nothing, 2.9 and 10 kg in the right hand has
 0.2, 2.8 and 9.7 kg, which explain 0.33, 0.97 and 0.98. Some 90 other recordings, which did not choose, stay below 0.45,
 but one of who stands (1 kg, 0.81) and a flywheel's cable, whose hands are not both marked (59 kg, 0.86)."""
+SHIFT_M, SHIFTED = 0.03, 0.5
+"""A load that would have the ground push so much farther towards the hands, on average, shifts it by at least this part
+of that: a centre of mass is known to 0.02 m. A simulated squat with the arms held forward and nothing in them, which
+chose, has 5.7 kg by 4 N of acceleration, 0.84 explained, and 0.9 kg by where the ground pushes; with 6 kg it would be
+0.045 m. Four other squats, with nothing and with 3, 6 and 10 kg in the hands, judged."""
 MORE = 0.02
 """Part of the weight that plates carry beyond the mass from which the hands may hold it: of less, deviations hold what
 it does to L5/S1 (1.2 kg at half a metre are 6 N m). `truth3d`'s 31 trials, which chose it, have up to 0.008; those of
@@ -40,15 +46,16 @@ _ARMS = ("hand", "forearm", "radius", "ulna")
 """Segments that show where the hands are, the nearest first."""
 
 
-def carried_in_hands(needed: Needed, force: Array) -> float | None:
+def carried_in_hands(needed: Needed, force: Array, pressed: Array) -> float | None:
     """Mass, kg, that moves with the hands and that the model does not have; None where nothing shows one.
 
     Args:
-        force: (T, 3) N, the sum over the plates, NaN where it is not known.
+        force: (T, 3) N, the sum over the plates, NaN where it is not known. pressed: (T, 2) m, where that acts on the
+            ground.
     """
     initial, markers = needed.initial, needed.markers
     owners = [marker.segment for marker in initial.spec.markers]
-    hands = []
+    hands, places = [], []
     for side in ("_r", "_l"):
         own = next((name + side for name in _ARMS if name + side in owners), None)
         path = mean_seen(markers[:, [k for k, owner in enumerate(owners) if owner == own]], axis=1)
@@ -58,6 +65,7 @@ def carried_in_hands(needed: Needed, force: Array) -> float | None:
         frames = np.arange(len(path))
         whole = np.stack([np.interp(frames, frames[seen], path[seen, axis]) for axis in range(3)], axis=1)
         hands.append(second_derivative(whole, needed.rate))
+        places.append(whole)
     excess = force - needed.force
     # of 1 kg in both hands that was taken for a part of the body
     moves = np.mean(hands, axis=0) + np.array([0.0, GRAVITY_M_S2, 0.0]) - needed.force / initial.weighed_kg
@@ -69,8 +77,33 @@ def carried_in_hands(needed: Needed, force: Array) -> float | None:
     carried_kg = float(moved @ lacks / (moved @ moved))
     explained = 1.0 - np.sum((lacks - carried_kg * moved) ** 2) / max(float(lacks @ lacks), 1e-12)
     if carried_kg > HEAVY_KG and explained > FOLLOWS:
-        return carried_kg
+        at, moves = np.mean(places, axis=0), np.mean(hands, axis=0)
+        return carried_kg if _presses_there(needed, needed.judged(force), pressed, at, moves, carried_kg) else None
     return _taken_up(needed.smoothed(excess[:, [1]], force)[:, 0], needed.rate)
+
+
+def _presses_there(needed: Needed, judged: Flags, pressed: Array, at: Array, moves: Array, carried_kg: float) -> bool:
+    """Whether the ground pushes towards the hands, (T, 3) m and m/s^2, as it does under such a load; so, too, where
+    they are too near to the body's own middle to tell."""
+    centre, mass_kg = needed.centre, needed.initial.weighed_kg
+    if centre is None:
+        return True
+    body = _over(centre.path, centre.acceleration)
+    shift, towards = pressed - body, _over(at, moves) - body
+    known = judged & np.isfinite(shift).all(axis=1)
+    if not known.any():
+        return True
+    square = float(np.mean(np.sum(towards[known] ** 2, axis=1)))
+    if carried_kg * np.sqrt(square) < SHIFT_M * mass_kg:
+        return True
+    by_place_kg = mass_kg * float(np.mean(np.sum(shift[known] * towards[known], axis=1))) / square
+    return by_place_kg > SHIFTED * carried_kg
+
+
+def _over(at: Array, moves: Array) -> Array:
+    """(T, 2) m where the ground pushes under a point at (T, 3) m that accelerates, m/s^2, and nothing else."""
+    upward = (moves[:, [1]] + GRAVITY_M_S2).clip(1.0)
+    return np.asarray((at - at[:, [1]] * moves / upward)[:, [0, 2]])
 
 
 def _taken_up(excess: Array, rate: float) -> float | None:

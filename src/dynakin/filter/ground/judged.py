@@ -158,7 +158,7 @@ def _rate_or_load(on: OnGround, total: Array, touched: Flags) -> PlateErrors | N
     # a low-pass takes accelerations, too
     if found is not None and not (found[1] > 1.0 and found_low_pass(on.trial.recording)):
         return replace(on.errors, said=(warning("rate", wrong_rate_in_words(needed.rate, *found)),))
-    if (load_kg := carried_in_hands(needed, total)) is None:
+    if (load_kg := carried_in_hands(needed, total, pressed_at(on.trial.wrench))) is None:
         return None
     if not touched.any():
         return replace(on.errors, said=(warning("carried", carried_in_words(load_kg)),))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.errors import ConfigError
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in_words, out_of_step_in_words
 from dynakin.filter.ground.fine_delay import UNKNOWN_S, clock_delay
@@ -57,6 +58,7 @@ def known_ground(
             asks.
 
     Raises:
+        ConfigError: a plate is given to one foot, or contact, and another foot stands on it.
         RecordingError: the plates are refused.
     """
     trial, zeros = _zeroed(GroundTrial(recording, Needed(initial, recording.time, markers), assigned, tolerance))
@@ -67,6 +69,8 @@ def known_ground(
     clock = _Clock(coarse, 0.0 if coarse is None else coarse.sd_s, ())
     if ground.loads is not None and ground.loads.on.any():
         clock, ground, known = _in_step(as_it_is, coarse, on_ground, ground, known)
+    if ground.loads is not None and ground.loads.misgiven:  # in step: late plates are pressed where nobody is any more
+        raise ConfigError(ground.loads.misgiven)
     moved = () if clock.taken is None else (_taken_in_words(clock.taken, recording, not initial.unseen_kg),)
     behind_s = 0.0 if clock.taken is None else clock.taken.delay_s
     notes = (*zeros, *moved, *ground.notes, *clock.notes)

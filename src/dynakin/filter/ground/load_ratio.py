@@ -12,7 +12,7 @@ from dynakin.arrays import runs
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-_WITHIN, _OFTEN = 0.15, 0.2
+_WITHIN, _OFTEN, _ROUNDS = 0.15, 0.2, 3
 AMPLITUDE, LEFT_OPEN = 0.15, 0.02
 """Part by which accelerations of the markers may be larger or smaller than the body's (skin, a trunk that bends): in a
 run or a landing single frames are no witnesses of the mass, means over a second or some strides are. Chosen on a real
@@ -42,10 +42,14 @@ def load_ratio(
     frames = _Loads(need, have, amplitude).carrying(judged, weight)
     if len(frames.need) <= _OFTEN * np.count_nonzero(judged):
         return None
+    about = 1.0
+    for _ in range(_ROUNDS):  # frames chosen by the declared mass lean towards it: they are chosen by the one found
+        about = frames.ratio
+        frames = _Loads(need, have, amplitude).carrying(judged, weight, about)
     window = min(window, max(end - first for first, end in runs(judged)))
     needed, had, whole = (window_means(np.where(judged, v, 0.0), window) for v in (need, have, judged.astype(float)))
     found = [frames]
-    means = _Loads(needed, had, amplitude).carrying(whole > 1.0 - 1e-9, weight)
+    means = _Loads(needed, had, amplitude).carrying(whole > 1.0 - 1e-9, weight, about)
     if len(means.need):
         low, high = np.percentile(means.have / means.need, (2.0, 98.0))
         if high - low < apart:
@@ -69,10 +73,10 @@ class _Loads(NamedTuple):
     def ratio(self) -> float:
         return float(np.median(self.have / self.need))
 
-    def carrying(self, judged: Flags, weight: float) -> _Loads:
-        """Those that are judged and in which the plates carry about the person."""
+    def carrying(self, judged: Flags, weight: float, about: float = 1.0) -> _Loads:
+        """Those that are judged and in which the plates carry about the person, so many times as heavy as declared."""
         loaded = judged & (self.need > 0.5 * weight)
-        near = loaded & (np.abs(self.have - self.need) < _WITHIN * self.need)
+        near = loaded & (np.abs(self.have - about * self.need) < _WITHIN * about * self.need)
         return _Loads(self.need[near], self.have[near], self.amplitude)
 
     def left_open(self, weight: float) -> float:

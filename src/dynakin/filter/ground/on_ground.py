@@ -96,12 +96,13 @@ class OnGround:
             RecordingError: the plates are refused.
         """
         recording, initial = trial.recording, trial.initial
-        loads = _loads_of_feet(trial)
         paths, may = declared_contacts(initial, trial.needed.markers)
+        places = {name: paths[:, 1 + c] for c, name in enumerate(initial.contacts)}
+        loads = _loads_of_feet(trial, places)
         taken = dict[str, tuple[str, ...]]()
         if loads is not None and initial.contacts and recording.plates:
             taken = plates_of_their_own(recording, initial, loads, paths, may, trial.assigned or {})
-            loads = _loads_of_feet(trial, taken) if taken else loads
+            loads = _loads_of_feet(trial, places, taken) if taken else loads
         by_plate = [loads is not None and name in loads.others for name in initial.contacts]
         may &= ~np.array(by_plate, dtype=bool)
         found = OnGround(trial, loads, paths, may, by_plate, taken)
@@ -159,7 +160,9 @@ class OnGround:
         return np.where(loads.total_known[:, None], self.all_of_it[:, :3], np.nan)
 
 
-def _loads_of_feet(trial: GroundTrial, taken: Mapping[str, tuple[str, ...]] | None = None) -> FootLoads | None:
+def _loads_of_feet(
+    trial: GroundTrial, places: Mapping[str, Array], taken: Mapping[str, tuple[str, ...]] | None = None
+) -> FootLoads | None:
     """What each foot carries by feet and plates, of which some are taken as declared contacts'; None of a model that
     stands on its root."""
     recording, initial, assigned = trial.recording, trial.initial, trial.assigned
@@ -173,6 +176,7 @@ def _loads_of_feet(trial: GroundTrial, taken: Mapping[str, tuple[str, ...]] | No
         assigned=assigned,
         others=list(initial.contacts),
         given=taken,
+        places=places,
     )
     if not initial.unmarked_feet:
         return loads

@@ -24,6 +24,7 @@ from dynakin.recordings.feet.findings import exchanged, plate_findings, turned_m
 from dynakin.recordings.feet.handover import EARLY_S, LATE_S
 from dynakin.recordings.feet.like_the_other import like_the_other
 from dynakin.recordings.feet.loads import FootLoads, divided, plates_bear_all
+from dynakin.recordings.feet.misgiven import Misgiven
 from dynakin.recordings.feet.sharing import BEYOND_M, Sharing, mostly, partly_on
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.feet.who_stands_where import WhoStandsWhere
@@ -49,6 +50,7 @@ def foot_loads(
     assigned: Mapping[str, str] | None = None,
     others: Sequence[str] = (),
     given: Mapping[str, tuple[str, ...]] | None = None,
+    places: Mapping[str, Array] | None = None,
 ) -> FootLoads:
     """Give each plate's load to the foot that stands on it.
 
@@ -57,7 +59,8 @@ def foot_loads(
         foot_markers: foot -> names of the markers on it, and on its toes.
         assigned: plate -> foot or declared contact, where the user knows better (the whole recording).
         others: names of the contacts that are declared. given: plate -> those of them that bear on it and share it, in
-            the place of what `assigned` says.
+            the place of what `assigned` says. places: of declared contacts, (T, 3) m in the ground frame, against
+            which `assigned` is held.
 
     Raises:
         ConfigError: `assigned` names a plate, foot or contact that there is not.
@@ -69,7 +72,7 @@ def foot_loads(
     contacts = foot_contacts(recording, ground, foot_markers, plates)
     contacts = like_the_other(contacts, plates, forward, recording.rate)
     owners = {name: (owner,) for name, owner in fixed.items() if owner not in foot_markers} | dict(given or {})
-    return _Assignment(recording, ground, tuple(foot_markers), contacts, plates, fixed, owners, forward).loads()
+    return _Assignment(recording, ground, tuple(foot_markers), contacts, plates, fixed, owners, forward, places).loads()
 
 
 def check_assigned(fixed: Mapping[str, str], recording: Recording, bearers: tuple[str, ...]) -> None:
@@ -120,6 +123,7 @@ class _Assignment:
         fixed: dict[str, str],
         given: dict[str, tuple[str, ...]],
         forward: Array,
+        places: Mapping[str, Array] | None,
     ) -> None:
         self.recording, self.ground, self.feet = recording, ground, feet
         self.contacts, self.plates, self.fixed = contacts, plates, fixed | {name: own[0] for name, own in given.items()}
@@ -130,6 +134,13 @@ class _Assignment:
         self.on = np.zeros((n, F, P), dtype=bool)  # this foot stands on this plate
         self.off = np.zeros((n, F), dtype=bool)  # it may stand off the plates
         self.hidden = np.zeros((n, F), dtype=bool)  # nobody sees it, and it may stand anywhere
+        self.misgiven = {
+            p: Misgiven.of(
+                plate, fixed[plate.name], (places or {}).get(fixed[plate.name]), contacts, plates, recording.rate
+            )
+            for p, plate in enumerate(plates)
+            if plate.name in fixed
+        }
         self.under = self.under_feet()
         for k, foot in enumerate(feet):
             if foot in contacts:
@@ -161,7 +172,7 @@ class _Assignment:
                 self.on[:, :, p] = False
             elif plate.name in fixed:
                 self.on[:, :, p] = False
-                self.on[:, feet.index(fixed[plate.name]), p] = plate.pressed
+                self.on[:, feet.index(fixed[plate.name]), p] = plate.pressed & ~self.misgiven[p].presses
 
     def under_feet(self) -> Flags:
         """(T, F, P) plates whose centre of pressure lies under a foot. One on another level than the foot's own support
@@ -378,4 +389,5 @@ class _Assignment:
                 )
             )
         turned = turned_moments(who, self.recording.rate)
-        return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons), turned_moments=turned)
+        why = next((each.why for each in self.misgiven.values() if each.why), "")
+        return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons), turned_moments=turned, misgiven=why)

@@ -120,7 +120,7 @@ def _off_place(who: WhoStandsWhere, soles: Soles, p: int) -> Message | None:
             if others or shared or with_it.mean() < TOGETHER or not _covers(foot, first, end):
                 continue
             away = distance_to_hull(plate.cop[press], foot.outline[press])[with_it]
-            if np.isfinite(away).any() and np.nanpercentile(away, 25.0) > _reach(foot, soles.rate):
+            if np.isfinite(away).any() and np.nanpercentile(away, 25.0) > reach_m(foot, soles.rate):
                 offsets.setdefault(k, []).append((plate.cop[press] - soles.middle[press, k][:, [0, 2]])[with_it])
     if len(offsets) != 1:
         return None
@@ -134,7 +134,7 @@ def _off_place(who: WhoStandsWhere, soles: Soles, p: int) -> Message | None:
     )
 
 
-def _reach(foot: FootContact, rate: float) -> float:
+def reach_m(foot: FootContact, rate: float) -> float:
     """How far (m) a foot reaches beyond its markers, at most."""
     return LONGEST_M if shape_of(foot, np.ones(2), rate).ends is None else OFF_PLACE_M
 

@@ -59,6 +59,7 @@ class FootLoads:
         plates: P, in the ground frame, by which it was made.
         messages: sentences with times. reasons: those of them that say why something is not measured.
         turned_moments: why the plates' moments cannot be what the file says; "" where nothing speaks against them.
+        misgiven: why a plate cannot be its declared owner's; "" where none is given to the wrong one.
     """
 
     feet: tuple[str, ...]
@@ -76,6 +77,7 @@ class FootLoads:
     messages: tuple[Message, ...] = ()
     reasons: tuple[Message, ...] = ()
     turned_moments: str = ""
+    misgiven: str = ""
 
     @property
     def sharing(self) -> list[tuple[str, ...]]:

@@ -128,10 +128,11 @@ class WhoStandsWhere:
         ]
         if len(self.contacts) == len(self.feet) and p not in self.given:
             alone = ~self.on[:, :, p].any(axis=1) & (plate.push > JUDGED_N) & ~self.hidden.any(axis=1)
+            where = "the foot that it is given to does not stand" if plate.name in self.fixed else "no foot stands"
             found += [
                 warning(
                     "plates",
-                    f"{plate.name} carries up to {np.nanmax(plate.wrench[a:b, 1]):.0f} N where no foot stands, "
+                    f"{plate.name} carries up to {np.nanmax(plate.wrench[a:b, 1]):.0f} N where {where}, "
                     f"from {span(time, a, b)}: the total wrench is left out there.",
                 )
                 for a, b in runs(alone)
