@@ -255,6 +255,17 @@ def test_warnings_of_the_calibration_are_part_of_what_is_found(case: Case, ident
     assert said == (another, short.of(case.sims[0].recording.name))
 
 
+def test_a_first_trial_that_lends_its_lengths_is_not_blamed_for_moving(case: Case) -> None:
+    """Nobody gave it as a standing trial, and each run of it says nothing; a given one in which nobody stands is."""
+    squat, sitting = (sim.recording.window(1.5, 4.0) for sim in case.sims)
+    common = Common.measure(estimator(), squat)
+    trials = measure_all(common, [squat, sitting])
+    assert not any("nobody stands still" in str(message) for message in warned(common, trials))
+    given = Common.measure(estimator(), sitting, static=squat)
+    said = [str(message) for message in warned(given, measure_all(given, [sitting]))]
+    assert sum("nobody stands still in" in text for text in said) == 1
+
+
 def pulled(recording: Recording, frames: slice) -> Recording:
     """By a cable that bears 300 N in some frames, which no plate measures."""
     plates = []
