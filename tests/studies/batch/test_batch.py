@@ -15,6 +15,7 @@ from dynakin.cli.app import main
 from dynakin.errors import ConfigError
 from dynakin.simulation.trial import simulate
 from dynakin.studies.batch.dataset import read_dataset
+from dynakin.studies.batch.process import Options, belongs_to
 
 TRIAL = "output = 'o'\ntrials = '*.trc'\n[[subjects]]\nname = 'a'\n"
 SUBJECTS, TRIALS, SECONDS, RATE_HZ = 3, 2, 5.0, 50.0
@@ -103,6 +104,30 @@ def test_a_batch_that_was_moved_goes_on_where_it_lies(study: Path, done: int, tm
     lines = (study / "out" / "rows.jsonl").read_text()
     assert main(["batch", str(study / "study.toml"), "--tables-only", "-o", str(tmp_path / "moved")]) == 1
     assert (tmp_path / "moved" / "rows.jsonl").read_text() == lines
+
+
+def test_a_batch_goes_on_by_another_spelling_of_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was refused as one of other settings, to be removed, when called from elsewhere than where it began."""
+    folder = tmp_path / "study"
+    (folder / "a" / "x").mkdir(parents=True)
+    for name in ("a/x/t.trc", "a/x/f.mot", "a/still.trc", "mine.toml"):
+        (folder / name).write_text("")
+    text = 'trials = "x/*.trc"\nforces = "f.mot"\nstatic = "still.trc"\nfunctional = {hip_r = "gone.trc"}\n'
+    (folder / "study.toml").write_text(f"output = 'o'\n{text}\n[[subjects]]\nname = 'a'\n")
+
+    def found(path: str | Path, preset: str = "mine.toml") -> dict[str, object]:
+        return belongs_to(read_dataset(Path(path)), Options((preset,)))
+
+    monkeypatch.chdir(folder)
+    begun = found("study.toml")
+    assert found(folder / "study.toml", str(folder / "mine.toml")) == begun
+    monkeypatch.chdir(tmp_path)
+    for spelling in ("study", "./study/../study"):
+        assert found(f"{spelling}/study.toml", "study/mine.toml") == begun
+    folder.rename(tmp_path / "moved")
+    assert found("moved/study.toml", "moved/mine.toml") == begun
+    (tmp_path / "moved" / "a" / "still.trc").write_text("changed")
+    assert found("moved/study.toml", "moved/mine.toml") != begun
 
 
 def test_tables_that_are_not_there_are_not_announced(
