@@ -137,6 +137,12 @@ def test_few_trials_are_halved_and_many_are_not(case: Case) -> None:
     assert decided.folds == tuple(trial.movement.recording.name for trial in brief)
 
 
+def test_a_half_that_is_too_short_is_called_one(case: Case) -> None:
+    brief = case.trials[0].part(slice(0, 40))  # 1.6 s at 25 Hz
+    with pytest.raises(RecordingError, match=r"0\.\d+ s of frames .*, expected 1 s or more in one trial or its half: "):
+        decide(case.common, [brief])
+
+
 def none(subject: IdentifiedSubject) -> tuple[tuple[float, ...], ...]:
     """A covariance of 0."""
     return tuple((0.0,) * len(subject.batch.names) for _ in subject.batch.names)
