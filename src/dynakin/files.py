@@ -5,10 +5,15 @@ from __future__ import annotations
 import csv
 import json
 import math
+import os
+import platform
+import re
+import shutil
 import stat
 import uuid
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from numbers import Real
 from pathlib import Path
 from typing import Any
@@ -87,11 +92,43 @@ def with_nulls(value: Any) -> Any:
     return value if math.isfinite(value) else None  # NumPy's numbers too, without loading it
 
 
+_HERE = f"{zlib.crc32(platform.node().encode()):08x}"  # this computer: on a shared disk others write as well
+_UNFINISHED = re.compile(rf"\.dynakin-{_HERE}-(\d+)-[0-9a-f]{{8}}(\.\w+)?")
+
+
+def unfinished(folder: Path, suffix: str = "") -> Path:
+    """A new name in a folder for what takes another's place once it is whole. What processes of this computer that are
+    gone (killed while they wrote) left under such names goes."""
+    with suppress(OSError):
+        for left in list(folder.iterdir()):
+            process = _UNFINISHED.fullmatch(left.name)
+            if process is None or _runs(int(process[1])):
+                continue
+            if left.is_dir():
+                shutil.rmtree(left, ignore_errors=True)
+            else:
+                left.unlink(missing_ok=True)
+    return folder / f".dynakin-{_HERE}-{os.getpid()}-{uuid.uuid4().hex[:8]}{suffix}"
+
+
+def _runs(process: int) -> bool:
+    """Whether there is such a process; true where asking would end it (Windows)."""
+    if os.name != "posix":
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # somebody else's
+        return True
+    return True
+
+
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """Give a name beside a file to write to; on success that takes the place of the file, on failure it goes."""
     path = path.resolve()  # of a link, what it leads to
-    made = path.with_name(f".dynakin-{uuid.uuid4().hex[:8]}{path.suffix}")
+    made = unfinished(path.parent, path.suffix)
     try:
         yield made
         if path.is_file():

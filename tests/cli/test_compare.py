@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from dynakin.cli.app import main
-from dynakin.cli.compare_inputs import cases_of
+from dynakin.cli.compare_inputs import cases_of, without_plates_in_words
 from dynakin.simulation.output import save_trial
 from dynakin.simulation.trial import simulate_squat
 
@@ -71,13 +71,45 @@ def test_one_trial_gives_table_ii_on_screen_and_as_files(trial: list[str], tmp_p
 @pytest.mark.nightly
 def test_many_trials_give_mean_and_deviation(trial: list[str], tmp_path: Path, capsys: Said) -> None:
     markers, _, forces = trial
-    out = tmp_path / "comparison"
-    both = [markers, markers, "--forces", forces, "--forces", forces]
+    out, other = tmp_path / "comparison", tmp_path / "other"
+    save_trial(simulate_squat(seed=5, duration_s=10.0, mass_kg=70.0), other)
+    both = [markers, str(other / "markers.trc"), "--forces", forces, "--forces", str(other / "forces.mot")]
     assert main(["compare", *both, *SUBJECT, "--cutoff-hz", "8", "-o", str(out)]) == 0
     assert "2 trials, mean ± standard deviation" in capsys.readouterr().out
     row = rows_of(out / "table2.csv")[0]
-    assert row["n"] == "2" and float(row["rms_sd"]) == 0.0  # the same trial twice
+    assert row["n"] == "2" and float(row["rms_sd"]) > 0.0
     assert any(row["method"] == "AT (8 Hz)" for row in rows_of(out / "table2.csv"))
+
+
+def test_a_recording_given_twice_is_no_second_trial(trial: list[str], tmp_path: Path, capsys: Said) -> None:
+    """Its deviations were all 0."""
+    copy = shutil.copytree(Path(trial[0]).parent, tmp_path / "copy") / "markers.trc"
+    twice = [trial[0], trial[0], *trial[1:], *trial[1:]]
+    assert main(["compare", *twice, *SUBJECT]) == 2
+    assert f"{trial[0]} is given twice" in (said := capsys.readouterr()).err and not said.out.strip()
+    pair = ["--identify-on", trial[0], "--test-on", str(copy), *trial[1:], *trial[1:]]
+    assert main(["compare", *pair, *SUBJECT]) == 2
+    assert f"{trial[0]} and {copy} are one recording" in (said := capsys.readouterr()).err and not said.out.strip()
+
+
+def test_forces_beside_a_trial_are_named_and_missing_ones_refused_before_anything_runs(
+    trial: list[str], tmp_path: Path, capsys: Said
+) -> None:
+    shutil.copy(trial[0], tmp_path / "walk.trc")
+    alone = tmp_path / "walk.trc"
+    save_trial(simulate_squat(seed=5, duration_s=5.0, mass_kg=70.0), tmp_path / "other")
+    pair = ["--identify-on", str(alone), "--test-on", str(tmp_path / "other" / "markers.trc")]
+    for how in ([str(alone), "--halves"], pair):
+        assert main(["compare", *how, *SUBJECT]) == 2
+        said = capsys.readouterr()
+        assert f"{alone}: no force plates" in said.err and "(--forces)" in said.err and not said.out.strip()
+    shutil.copy(trial[2], tmp_path / "walk_grf.mot")
+    assert main(["compare", str(alone), "--halves", *SUBJECT]) == 2
+    assert "(--forces walk_grf.mot lies next to the recording)" in capsys.readouterr().err
+    (said_first,) = without_plates_in_words(cases_of([alone], [], [], 6.0, {"model": "sagittal7", "mass_kg": 70.0}))
+    assert str(said_first) == "walk: No force plates; --forces walk_grf.mot lies next to the recording."
+    main(["compare", str(alone), *SUBJECT])
+    assert "walk_grf.mot lies next to the recording" in " ".join(capsys.readouterr().out.split())
 
 
 def test_halves_and_unseen_stand_beside_persistence(trial: list[str], tmp_path: Path, capsys: Said) -> None:

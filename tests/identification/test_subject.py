@@ -137,6 +137,12 @@ def test_few_trials_are_halved_and_many_are_not(case: Case) -> None:
     assert decided.folds == tuple(trial.movement.recording.name for trial in brief)
 
 
+def test_a_half_that_is_too_short_is_called_one(case: Case) -> None:
+    brief = case.trials[0].part(slice(0, 40))  # 1.6 s at 25 Hz
+    with pytest.raises(RecordingError, match=r"0\.\d+ s of frames .*, expected 1 s or more in one trial or its half: "):
+        decide(case.common, [brief])
+
+
 def none(subject: IdentifiedSubject) -> tuple[tuple[float, ...], ...]:
     """A covariance of 0."""
     return tuple((0.0,) * len(subject.batch.names) for _ in subject.batch.names)
@@ -253,6 +259,17 @@ def test_warnings_of_the_calibration_are_part_of_what_is_found(case: Case, ident
     trial = replace(case.trials[0].movement, doubts=(another, short))
     said = warned(replace(case.common, initial=doubtful), [replace(case.trials[0], movement=trial)])
     assert said == (another, short.of(case.sims[0].recording.name))
+
+
+def test_a_first_trial_that_lends_its_lengths_is_not_blamed_for_moving(case: Case) -> None:
+    """Nobody gave it as a standing trial, and each run of it says nothing; a given one in which nobody stands is."""
+    squat, sitting = (sim.recording.window(1.5, 4.0) for sim in case.sims)
+    common = Common.measure(estimator(), squat)
+    trials = measure_all(common, [squat, sitting])
+    assert not any("nobody stands still" in str(message) for message in warned(common, trials))
+    given = Common.measure(estimator(), sitting, static=squat)
+    said = [str(message) for message in warned(given, measure_all(given, [sitting]))]
+    assert sum("nobody stands still in" in text for text in said) == 1
 
 
 def pulled(recording: Recording, frames: slice) -> Recording:

@@ -293,3 +293,30 @@ def test_a_unit_in_brackets_is_read_or_named(tmp_path: Path) -> None:
     wrong = {name.replace("(m)", "(mm)"): value for name, value in columns.items()}
     with pytest.raises(RecordingError, match=r"column 'FP1_px \(mm\)' is in 'mm', expected"):
         read(trc(tmp_path, 11), write(tmp_path, "b.mot", grf_text(time, wrong)))
+
+
+def lacking(time: np.ndarray, *rows: int) -> np.ndarray:
+    return np.delete(time, rows)
+
+
+@pytest.mark.parametrize("rows", [(50,), (20, 70, 71), tuple(range(30, 45)), (0, 1, 40, 99)])
+def test_rows_that_a_table_at_the_markers_rate_lacks_are_missing(tmp_path: Path, rows: tuple[int, ...]) -> None:
+    """A lone one was taken for rounding of the times, which shifted all forces; more were refused without a file."""
+    recording = read(trc(tmp_path, 100))
+    table = read_table(write(tmp_path, "grf.mot", single(lacking(np.arange(100) / 100, *rows))))
+    found = attach_forces(recording, table, ReadOptions())
+    (plate,) = found.plates
+    missing = np.isnan(plate.force).any(axis=1)
+    assert np.flatnonzero(missing).tolist() == list(rows)
+    np.testing.assert_allclose(plate.force[~missing], [[10.0, 700.0, -20.0]] * (100 - len(rows)))
+    (said,) = [m for m in found.notes if "has no row for" in m.text]
+    assert f"{len(rows)} of 100 frames" in said.text and said.level == ("warning" if len(rows) > 10 else "note")
+    assert not any("rounded" in m.text for m in found.notes)
+    with pytest.raises(RecordingError, match=r"grf\.mot: plate has no force at 0.* s, cannot be resampled or filtered"):
+        attach_forces(recording, table, ReadOptions(plate_filter_hz=20.0))
+
+
+def test_a_gap_in_a_table_that_is_resampled_is_refused_by_file_and_time(tmp_path: Path) -> None:
+    table = read_table(write(tmp_path, "grf.mot", single(lacking(np.arange(1000) / 1000, 500, 501))))
+    with pytest.raises(RecordingError, match=r"grf\.mot: no row between 0\.499 s and 0\.502 s, expected one every"):
+        attach_forces(read(trc(tmp_path, 100)), table, ReadOptions())

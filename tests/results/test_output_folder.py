@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from dynakin.errors import OutputError
+from dynakin.files import unfinished
 from dynakin.pipeline import result as result_module
 from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
@@ -26,6 +29,20 @@ def test_an_earlier_output_is_replaced(small: Estimate, tmp_path: Path) -> None:
     Result(small).save(out)
     assert len((out / "metrics.json").read_text()) > 100
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
+
+
+def test_what_a_killed_process_left_goes_and_nothing_else(small: Estimate, tmp_path: Path) -> None:
+    code = "from pathlib import Path; from dynakin.files import unfinished; print(unfinished(Path()).name)"
+    gone = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    left = tmp_path / gone.stdout.strip()
+    mine, other = unfinished(tmp_path), tmp_path / ".dynakin-old-abc"
+    elsewhere = tmp_path / left.name.replace(left.name[9:17], "00000000")  # of another computer
+    for folder in (left, mine, other, elsewhere):
+        folder.mkdir()
+        (folder / "moments.sto").write_text("half of it")
+    (tmp_path / f"{left.name}.csv").write_text("half of it")
+    Result(small).save(tmp_path / "out")
+    assert {entry.name for entry in tmp_path.iterdir()} == {"out", mine.name, other.name, elsewhere.name}
 
 
 def test_a_link_to_a_folder_stays_one(small: Estimate, tmp_path: Path) -> None:

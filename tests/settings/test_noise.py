@@ -154,6 +154,11 @@ def test_a_written_preset_is_read_back(tmp_path: Path) -> None:
         presets.preset(str(tmp_path / "wrong.toml"))
 
 
+def test_a_file_of_notepad_begins_with_a_mark(tmp_path: Path) -> None:
+    (tmp_path / "own.toml").write_text("[noise]\nspeed_variance = 12.5\n", encoding="utf-8-sig")
+    assert presets.preset(str(tmp_path / "own.toml")).speed_variance == 12.5
+
+
 @pytest.mark.parametrize("schema", [Noise, Priors])
 def test_an_old_name_is_refused_by_the_new_one(schema: type[Strict], tmp_path: Path) -> None:
     assert set(schema.renamed.values()) <= set(schema.model_fields)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -39,15 +40,18 @@ def batch(
     with stage("loading"):
         from dynakin.report.text_tables import table2_text
         from dynakin.results.naming import plural
-        from dynakin.studies.batch.dataset import check_presets, read_dataset
+        from dynakin.studies.batch.dataset import check_presets, copies, read_dataset
         from dynakin.studies.batch.process import TRIALS, Options, belongs_to, run_batch, write_batch
         from dynakin.studies.batch.subjects import identify_subjects, with_parameters
         from dynakin.studies.engine.journal import ROWS, Journal, open_folder
         from dynakin.studies.engine.pools import open_pool
+        from dynakin.studies.engine.tasks import Failure
 
     if backend == "threads":
         raise ConfigError("batch: --backend threads, expected processes or dask: a crash would take all trials with it")
-    found = read_dataset(dataset, output)
+    whole = read_dataset(dataset, output)
+    twice = copies(whole)
+    found = replace(whole, sessions=tuple(session for session in whole.sessions if session.name not in twice))
     check_presets(preset or [], "batch: --preset")
     options = Options(tuple(preset or found.presets), cutoff, not tables_only)
     subjects = sorted({session.subject for session in found.sessions})
@@ -66,6 +70,8 @@ def batch(
                 identified = identify_subjects(found, pool, journal=journal, progress=progress)
         with stage("batch") as progress:
             result = run_batch(with_parameters(found, identified), options, pool, journal=journal, progress=progress)
+    for name, earlier in twice.items():
+        result.failures[name] = Failure(f"is a copy of {earlier} and left out, expected each recording once")
     console = out()
     if result.rows:
         people = len({name.split("/")[0] for name in result.rows})

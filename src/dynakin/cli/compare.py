@@ -40,17 +40,24 @@ def compare(
 ) -> None:
     """Compare the filter with the table and the classical method, over one or many trials (the paper's Table II)."""
     with stage("loading"):
-        from dynakin.cli.compare_inputs import cases_of, chosen_trials, halves_of
+        from dynakin.cli.compare_inputs import (
+            cases_of,
+            chosen_trials,
+            halves_of,
+            refuse_copies_of,
+            refuse_without_plates,
+            without_plates_in_words,
+        )
         from dynakin.cli.compare_tables import (
             compare_cases,
             described,
             print_comparison,
             print_held_out,
+            print_notes,
             print_repetitions,
             print_unseen,
             settings_of,
         )
-        from dynakin.messages import Message
         from dynakin.report.comparison_page import render_comparison
         from dynakin.validation.files import check_comparison_folder, save_comparison
         from dynakin.validation.methods import ComparedTrial
@@ -61,13 +68,17 @@ def compare(
     chosen = chosen_trials(trials or [], identify_trial, test_trial, halved or not_seen)
     with stage("reading the recordings"):
         cases = cases_of(chosen, forces or [], preset or [], cutoff, given)
+    refuse_copies_of(cases)
+    if halved or identify_trial is not None:
+        refuse_without_plates(cases)
     for case in cases if not_seen else []:
         check_horizon(case.recording, horizon / 1000.0)
     console = out()
     tables: dict[str, Sequence[Any]] = {}
     more: dict[str, Any] = {"settings": settings_of(cases)}
     compared: list[ComparedTrial] = []
-    notes: list[Message] = []  # of what was held out; each trial keeps its own
+    notes = without_plates_in_words(cases)  # and what was held out; each trial keeps its own
+    print_notes(console, notes)
     failed: DynakinError | None = None  # what is computed by then is kept
     if identify_trial is not None:
         tables |= print_held_out(console, [(cases[0], cases[1], False)], notes)

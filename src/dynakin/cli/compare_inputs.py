@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 from dynakin.cli.options import Given
-from dynakin.errors import ConfigError
+from dynakin.cli.prepared import forces_beside
+from dynakin.errors import ConfigError, RecordingError
+from dynakin.messages import Message, note
+from dynakin.recordings.companions import is_copy
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import plural
 from dynakin.settings.settings import Settings, read_keys
@@ -72,6 +76,43 @@ def cases_of(
     return [
         replace(case, recording=replace(case.recording, name=name)) for case, name in zip(cases, names, strict=True)
     ]
+
+
+def refuse_copies_of(cases: Sequence[Case]) -> None:
+    """A mean over trials would count a copy twice, as if it had no deviation; and predict it because it knows it.
+
+    Raises:
+        RecordingError: two trials are one recording; both are named.
+    """
+    for one, other in combinations([case.recording for case in cases], 2):
+        if is_copy(one, other):
+            where = [str(recording.path or recording.name) for recording in (one, other)]
+            twice = f"{where[0]} is given twice" if where[0] == where[1] else f"{' and '.join(where)} are one recording"
+            raise RecordingError(f"compare: {twice} (the markers are the same), expected different trials")
+
+
+def refuse_without_plates(cases: Sequence[Case]) -> None:
+    """Before anything that takes long.
+
+    Raises:
+        RecordingError: nothing was measured by which a prediction could be judged.
+    """
+    for recording in (case.recording for case in cases):
+        if not recording.plates:
+            beside = forces_beside(recording) or "--forces"
+            raise RecordingError(
+                f"{recording.path or recording.name}: no force plates, expected at least one: what is predicted is "
+                f"judged by them ({beside})"
+            )
+
+
+def without_plates_in_words(cases: Sequence[Case]) -> list[Message]:
+    """Of trials without plates that ground forces lie next to."""
+    found = []
+    for recording in (case.recording for case in cases):
+        if not recording.plates and (beside := forces_beside(recording)):
+            found.append(note("plates", f"No force plates; {beside}.").of(recording.name))
+    return found
 
 
 def told_apart(recordings: Sequence[Recording]) -> list[str]:

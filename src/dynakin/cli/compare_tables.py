@@ -76,9 +76,14 @@ def print_held_out(
     title = f"Identified -> judged from markers alone: {names if len(pairs) == 1 else f'{len(pairs)} trials'}"
     rows = merged(tables)
     console.print(as_table(table2_text(rows, title)))
+    print_notes(console, notes)
+    return {"held_out": rows}
+
+
+def print_notes(console: Console, notes: Sequence[Message]) -> None:
+    """A line each."""
     for said in notes:
         _print_note(console, said)
-    return {"held_out": rows}
 
 
 def _print_note(console: Console, said: Message) -> None:

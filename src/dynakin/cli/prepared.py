@@ -16,6 +16,7 @@ from dynakin.filter.prepared import Prepared
 from dynakin.messages import Message, about, notes_of
 from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.feet.loads import MEASURED, REASONS, SHARED, SWING, FootLoads
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.times import span
 from dynakin.results.naming import listed, plural
 from dynakin.settings.settings import Settings
@@ -110,6 +111,15 @@ def short(message: Message) -> Message:
     return replace(message, text=f"{head}{colon}{', '.join(parts[:_KEPT])} and {len(parts) - _KEPT} more.")
 
 
+_FOLLOW = "ground reactions follow from the motion"
+
+
+def forces_beside(recording: Recording) -> str:
+    """That a table of ground forces lies next to a recording; "" where there is none."""
+    forces = None if recording.path is None else companion_forces(recording.path)
+    return "" if forces is None else f"--forces {forces.name} lies next to the recording"
+
+
 def _sides(ready: Prepared) -> str:
     side = ready.calibrated.side
     return (
@@ -120,11 +130,7 @@ def _sides(ready: Prepared) -> str:
 def _plates(ready: Prepared) -> str:
     plates, loads = ready.recording.plates, ready.ground.loads
     if not plates:
-        path = ready.recording.path
-        forces = None if path is None else companion_forces(path)
-        if forces is not None:
-            return f"none; --forces {forces.name} lies next to the recording."
-        return "none: ground reactions follow from the motion."
+        return f"none; {beside}." if (beside := forces_beside(ready.recording)) else f"none: {_FOLLOW}."
     if loads is None:
         return f"{plural(len(plates), 'plate')}, their sum is used."
     bears = [

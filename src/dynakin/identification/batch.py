@@ -81,8 +81,12 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
     rows, own_count = common.rows, len(unknowns.nuisance_sd)
     chosen = [_known(trial, rows) for trial in trials]
     step = [step_of(trial.movement.time) for trial in trials]
-    if not any(known_s(trial) >= SHORTEST_S for trial in trials):
-        raise RecordingError("identification: no trial has a second of frames with the plates' wrench, expected one")
+    longest = max(map(known_s, trials))
+    if longest < SHORTEST_S:
+        raise RecordingError(
+            f"identification: {longest:.2f} s of frames with the plates' wrench, expected {SHORTEST_S:g} s or more in "
+            "one trial"
+        )
     sigma = np.tile(FIRST_SIGMA[rows], (len(trials), 1))
     least = [max(1.0, LEAST_TAU_S / dt) for dt in step]
     tau = np.array([[frames] * len(rows) for frames in least])

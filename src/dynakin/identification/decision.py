@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms, wrench_about
+from dynakin.errors import RecordingError
 from dynakin.identification.batch import Posterior, at_start, identify_batch, known_s
 from dynakin.identification.trials import SHORTEST_S, Common, MeasuredTrial, middle_of
 from dynakin.identification.unknowns import Unknowns
@@ -93,6 +94,9 @@ class Decision:
         return [*said, f"The identified segment inertia is used: {verdict}."]
 
 
+_HALVED = " or its half: fewer than three trials are halved, and each half is predicted by the others"
+
+
 def parts_of(trials: Sequence[MeasuredTrial]) -> list[MeasuredTrial]:
     """What is left out in turn: the trials, or the halves of fewer than three if these can be identified on."""
     if len(trials) > 2:
@@ -149,7 +153,10 @@ def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress |
     for k, (left_out, half) in enumerate(zip(parts, halves, strict=True)):
         others = [part for j, part in enumerate(parts) if j != k]
         if np.isfinite(left_out.wrench[:, common.rows]).all(axis=1).any():  # else there is nothing to judge by
-            found = posteriors(common, others)
+            try:
+                found = posteriors(common, others)
+            except RecordingError as error:
+                raise error.reworded(f"{error.message}{_HALVED if half else ''}") from None
             for rows, part in ((low_passed, left_out), (full_band, left_out.full_band())):
                 states = part.movement.states
                 rows.append({use: rms_of(common, part, one.wrench(common, states)) for use, one in found.items()})

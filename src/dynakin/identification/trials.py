@@ -21,7 +21,7 @@ from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
-from dynakin.recordings.companions import another_person
+from dynakin.recordings.companions import another_person, is_copy
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
@@ -45,9 +45,6 @@ within 0.2 m/s, 2 % of gravity; other plates or another person miss by more."""
 
 SHORTEST_S = 1.0
 """Seconds of frames with the plates' wrench: in one trial at least, and in each of which the plates are doubted."""
-
-SAME_PLACE_M = 1e-5
-"""How far apart the markers of a trial and of its copy lie at most: files round to 1e-5 m or less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,8 +284,7 @@ def refuse_copies(recordings: Sequence[Recording]) -> None:
         RecordingError: the markers of two recordings are the same; both are named.
     """
     for one, other in combinations(recordings, 2):
-        alike = one.marker_names == other.marker_names and one.markers.shape == other.markers.shape
-        if alike and np.allclose(one.markers, other.markers, rtol=0.0, atol=SAME_PLACE_M, equal_nan=True):
+        if is_copy(one, other):
             raise RecordingError(
                 f"{one.path or one.name} and {other.path or other.name}: the markers are the same, one is a copy; "
                 "expected different trials: each is held out in turn"

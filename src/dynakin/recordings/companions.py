@@ -37,6 +37,8 @@ _NEAR_M = 0.3
 _PAIRS = 6
 _COMMON = 0.5
 """Part of the markers of the one with fewer that the other has."""
+_SAME_PLACE_M = 1e-5
+"""How far apart the markers of a trial and of its copy lie at most: files round to 1e-5 m or less."""
 _FRAMES = 1000  # spread over a trial, enough for these
 
 
@@ -108,6 +110,12 @@ def another_person(trial: Recording, other: Recording) -> str:
         f"distances between markers that move as one differ by {1e3 * apart:.0f} mm from those in {other.name} "
         f"(median; of one person by {1e3 * _SAME_M:.0f} mm at most): another person, or markers put on anew"
     )
+
+
+def is_copy(one: Recording, other: Recording) -> bool:
+    """Whether the markers of two recordings are the same, as no two movements are."""
+    alike = one.marker_names == other.marker_names and one.markers.shape == other.markers.shape
+    return alike and np.allclose(one.markers, other.markers, rtol=0.0, atol=_SAME_PLACE_M, equal_nan=True)
 
 
 def of_most(trials: Sequence[Recording], static: Recording | None = None) -> Recording:

@@ -149,7 +149,7 @@ def read_toml(path: Path, raises: type[DynakinError] = ModelError) -> dict[str, 
         ModelError (or ``raises``): no such file, not readable, or not TOML (with the line).
     """
     try:
-        text = read_bytes(path, raises, LARGEST_TEXT).decode()
+        text = read_bytes(path, raises, LARGEST_TEXT).decode("utf-8-sig")
         long = _LONG_KEY.search(text)
         if long:
             line = text.count("\n", 0, long.start()) + 1

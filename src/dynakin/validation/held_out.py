@@ -251,7 +251,7 @@ def start_as(
     Args:
         estimator: that measured it. static: lengths come from it. ground: of the same laboratory, None: found.
     """
-    how = replace(estimator.how, side=measured.side, vertical=measured.ground.vertical, ground=ground)
+    how = replace(estimator.how, side=measured.side, vertical=measured.ground.vertical, ground=ground, measured=True)
     return estimator.of_person(measured).model.calibrate(recording, static=static, how=how)
 
 

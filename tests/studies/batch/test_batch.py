@@ -14,7 +14,8 @@ import pytest
 from dynakin.cli.app import main
 from dynakin.errors import ConfigError
 from dynakin.simulation.trial import simulate
-from dynakin.studies.batch.dataset import read_dataset
+from dynakin.studies.batch.dataset import copies, read_dataset
+from dynakin.studies.batch.process import Options, belongs_to
 
 TRIAL = "output = 'o'\ntrials = '*.trc'\n[[subjects]]\nname = 'a'\n"
 SUBJECTS, TRIALS, SECONDS, RATE_HZ = 3, 2, 5.0, 50.0
@@ -103,6 +104,52 @@ def test_a_batch_that_was_moved_goes_on_where_it_lies(study: Path, done: int, tm
     lines = (study / "out" / "rows.jsonl").read_text()
     assert main(["batch", str(study / "study.toml"), "--tables-only", "-o", str(tmp_path / "moved")]) == 1
     assert (tmp_path / "moved" / "rows.jsonl").read_text() == lines
+
+
+def test_a_batch_goes_on_by_another_spelling_of_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was refused as one of other settings, to be removed, when called from elsewhere than where it began."""
+    folder = tmp_path / "study"
+    (folder / "a" / "x").mkdir(parents=True)
+    for name in ("a/x/t.trc", "a/x/f.mot", "a/still.trc", "mine.toml"):
+        (folder / name).write_text("")
+    text = 'trials = "x/*.trc"\nforces = "f.mot"\nstatic = "still.trc"\nfunctional = {hip_r = "gone.trc"}\n'
+    (folder / "study.toml").write_text(f"output = 'o'\n{text}\n[[subjects]]\nname = 'a'\n")
+
+    def found(path: str | Path, preset: str = "mine.toml") -> dict[str, object]:
+        return belongs_to(read_dataset(Path(path)), Options((preset,)))
+
+    monkeypatch.chdir(folder)
+    begun = found("study.toml")
+    assert found(folder / "study.toml", str(folder / "mine.toml")) == begun
+    monkeypatch.chdir(tmp_path)
+    for spelling in ("study", "./study/../study"):
+        assert found(f"{spelling}/study.toml", "study/mine.toml") == begun
+    folder.rename(tmp_path / "moved")
+    assert found("moved/study.toml", "moved/mine.toml") == begun
+    (tmp_path / "moved" / "a" / "still.trc").write_text("changed")
+    assert found("moved/study.toml", "moved/mine.toml") != begun
+
+
+def test_a_copy_is_left_out_and_named(tmp_path: Path) -> None:
+    trials = "trials = [{trial = 'x.trc', forces = 'x.mot'}, {trial = 'y.trc', forces = 'y.mot'}, "
+    trials += "{trial = 'x.trc', name = 'paper', forces = 'x.mot', preset = 'paper'}, {trial = 'x.trc', name = 'none'}]"
+    (tmp_path / "s.toml").write_text(f"output = 'o'\n[[subjects]]\nname = 'a'\n{trials}\n")
+    (tmp_path / "a").mkdir()
+    for name in ("x.trc", "y.trc", "x.mot", "y.mot"):
+        (tmp_path / "a" / name).write_text(name[1:])
+    assert copies(read_dataset(tmp_path / "s.toml")) == {"a/y": "a/x"}
+    (tmp_path / "a" / "y.mot").write_text(".tom")
+    assert copies(read_dataset(tmp_path / "s.toml")) == {}
+
+
+def test_a_copy_stops_nothing(study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for trial in ("squat_1", "squat_2"):
+        shutil.copytree(study / "S1" / "squat_1", tmp_path / "S1" / trial)
+    text = (study / "study.toml").read_text()
+    (tmp_path / "study.toml").write_text(text[: text.index('\n[[subjects]]\nname = "S2"')])
+    assert main(["batch", str(tmp_path / "study.toml"), "--tables-only"]) == 1
+    said = capsys.readouterr().out
+    assert "1 trial of 1 subject" in said and "S1/squat_2: is a copy of S1/squat_1 and left out" in said
 
 
 def test_tables_that_are_not_there_are_not_announced(

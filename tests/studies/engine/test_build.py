@@ -18,7 +18,7 @@ from dynakin.studies.tuning import fit, grid
 
 SHARED: Any = SimpleNamespace(trials=(), base=dynakin.presets.default(), left_out=True)
 BATCH: Any = SimpleNamespace(presets=(), cutoff_hz=6.0, files=False)
-DATASET: Any = SimpleNamespace(sessions=())
+DATASET: Any = SimpleNamespace(sessions=(), path=Path("study.toml"))
 
 
 @pytest.mark.parametrize(

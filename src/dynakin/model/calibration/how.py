@@ -21,6 +21,8 @@ class Calibration:
         priors, bounds: prior standard deviations and half widths of (9).
         ground: directions of the ground frame, where they are known already. Its origin is replaced by the model's
             ground landmark.
+        measured: whether the lengths' recording has been measured before: what is doubtful of it was said then. It may
+            be another trial in which nobody is to stand.
     """
 
     side: str = "auto"
@@ -29,6 +31,7 @@ class Calibration:
     priors: Priors = field(default_factory=Priors)
     bounds: Bounds = field(default_factory=Bounds)
     ground: GroundFrame | None = None
+    measured: bool = False
 
     def find_ground(
         self, recording: Recording, pairs: FacingPairs, static: Recording | None, *, floating: bool

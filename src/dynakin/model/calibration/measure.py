@@ -153,8 +153,8 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
     marked = _marked(asked, trials, messages)
     model, finder, locks = marked.model, marked.finder, marked.locks
     still = _calibration_frames(asked, trials, marked, messages)
-    long_enough = asked.static is not None and np.ptp(asked.static.time) >= MIN_STILL_S
-    if asked.static is not None and long_enough and not still.stands:
+    asks = asked.static is not None and not asked.how.measured and np.ptp(asked.static.time) >= MIN_STILL_S
+    if asked.static is not None and asks and not still.stands:
         text = (
             f"nobody stands still in {asked.static.name} (--static): lengths and marker places are measured on frames "
             "in which the person moves. Give a trial of standing, or none."
@@ -326,7 +326,7 @@ def _landmarks(
     if supposed and not still.stands:
         raise no_legs(supposed, source, asked.static, legs, finder)
     unmarked = tuple(name for name in LEG_JOINTS if name in (*legs.joints, *supposed))
-    if unmarked:
+    if unmarked and not asked.how.measured:
         messages.append(unmarked_legs(unmarked, source, asked.static))
     return found, unmarked
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import runs
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, other_unit, parse_column
@@ -17,8 +18,8 @@ from dynakin.recordings.plates.pressure import Surface, main_axis, plate_from_wr
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
 from dynakin.recordings.pushes import LOADED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
-from dynakin.recordings.resampling import ReadOptions, low_pass, reach_s, resample, same_times, touched
-from dynakin.recordings.times import rate_of, settled_times, step_of
+from dynakin.recordings.resampling import UNEVEN, ReadOptions, low_pass, reach_s, resample, same_times, touched
+from dynakin.recordings.times import rate_of, settled_times, spans, step_of
 
 Flags = npt.NDArray[np.bool_]
 
@@ -26,6 +27,7 @@ _MIN_RATE_RATIO = 0.99
 _LEAST_COVER, _END_S = 0.5, 0.1
 """A table of less than this part of the frames is another trial's. An export that ends some rows before the markers do
 needs nothing done; more is warned of."""
+_GAP, _NAMED = 1.5, 3  # steps between rows from which on some are missing; gaps that are named
 
 
 def plates_from_table(table: Table) -> tuple[tuple[Plate, ...], tuple[Message, ...]]:
@@ -144,9 +146,9 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
     """
     columns = [k for k, name in enumerate(table.names) if parse_column(name)]
     time, stamps = settled_times(table.time, table.values[:, columns])
-    table = replace(table, time=time)
+    table, lacking = _at_frames(replace(table, time=time), recording)
     plates, notes = plates_from_table(table)
-    notes += tuple(said.of(table.path.name) for said in stamps)
+    notes += tuple(said.of(table.path.name) for said in stamps) + lacking
     if recording.plates:
         text = f"{table.path.name} replaces the {len(recording.plates)} plates of {recording.name}."
         notes += (note("recording", text),)
@@ -156,6 +158,7 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         notes += tuple(frozen_in_words(plate.name, table.time, lost))
     covered: Flags = np.ones(recording.n_frames, dtype=bool)
     if not untouched:
+        _refuse_gaps(table)
         covered = _covered(recording, table)
         notes += _uncovered_in_words(recording, table, covered)
         first, last = table.time[0], table.time[-1]
@@ -175,6 +178,46 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         for plate, lost in zip(plates, hung, strict=True)
     ]
     return recording.with_plates(tuple(found), notes)
+
+
+def _at_frames(table: Table, recording: Recording) -> tuple[Table, tuple[Message, ...]]:
+    """A table at the markers' own rate that lacks rows with these blank (NaN), at the markers' times, and what there is
+    to say of it; any other as it is."""
+    t, m = table.time, recording.time
+    step = step_of(m)
+    if len(m) < 2 or not len(_gaps(t)) or abs(step_of(t) / step - 1.0) > UNEVEN or same_times(t, m):
+        return table, ()
+    after = np.clip(np.searchsorted(t, m), 1, len(t) - 1)
+    row = np.where(m - t[after - 1] < t[after] - m, after - 1, after)
+    there: Flags = np.asarray(np.abs(t[row] - m) < UNEVEN * step)
+    if there.mean() < _LEAST_COVER:
+        return table, ()
+    values = np.where(there[:, None], table.values[row], np.nan)
+    if there.all():
+        return replace(table, time=m, values=values), ()
+    count = np.count_nonzero(~there)
+    text = (
+        f"the table {table.path.name} has no row for {count} of {len(m)} frames ({spans(m, runs(~there), _NAMED)}): "
+        "the plates are not measured there."
+    )
+    few = count <= _END_S * recording.rate
+    said = note("recording", text) if few else warning("plates", f"{text} Export the forces of every frame.")
+    return replace(table, time=m, values=values), (said,)
+
+
+def _gaps(time: Array) -> npt.NDArray[np.intp]:
+    """Rows after which others are missing."""
+    return np.flatnonzero(np.diff(time) > _GAP * step_of(time)) if len(time) > 2 else np.zeros(0, dtype=np.intp)
+
+
+def _refuse_gaps(table: Table) -> None:
+    """A filter would take what lies about a gap for one movement."""
+    for k in _gaps(table.time)[:1]:
+        first, last, rate = table.time[k], table.time[k + 1], rate_of(table.time)
+        raise RecordingError(
+            f"{table.path}: no row between {first:g} s and {last:g} s, expected one every {1.0 / rate:.4g} s: forces "
+            "that are to be brought to the markers' times must have no gap; export them anew"
+        )
 
 
 def _frozen(plate: Plate, time: Array) -> Flags:
@@ -238,7 +281,10 @@ def _resampled(plate: Plate, table: Table, time: Array, options: ReadOptions) ->
     if options.plate_filter_hz is not None:
         rate = rate_of(table.time)
         wrench = low_pass(wrench, rate, options.plate_filter_hz, causal=options.causal)
-    wrench = resample(wrench, table.time, time, causal=options.causal)
+    try:
+        wrench = resample(wrench, table.time, time, causal=options.causal)
+    except RecordingError as error:
+        raise error.reworded(f"{table.path}: {error.message}") from None
     threshold = UNLOADED_N if options.force_threshold_n is None else options.force_threshold_n
     surface = _surface(plate)
     if surface is None:  # never loaded

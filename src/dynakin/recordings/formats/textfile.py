@@ -24,6 +24,7 @@ _NO_NUMBER = "-*."  # and any number of these
 _ROUGH = 0.1  # part of a step from which rounding of times is undone: `resampling.UNEVEN` would refuse it
 _COARSE = 1.05  # the same from which rounding makes two times equal: 100 Hz to 0.01 s has none
 _ENOUGH = 10  # times that show a grid
+_AGAIN = 3  # longer steps that may come from rounding
 
 
 _EXPORTS = {
@@ -177,6 +178,8 @@ def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array,
     slope = float(centred @ time / (centred @ centred))  # s a frame, by least squares
     if rounded_to is None or slope <= 0.0 or rounded_to <= _ROUGH * slope or (np.diff(time) < 0).any():
         return time, []
+    if _lacks_rows(np.diff(time)):
+        return time, []
     said = 1.0 / rate_in_header if rate_in_header and 0.8 < rate_in_header * slope < 1.2 else slope
     if rounded_to < _COARSE * said and (np.diff(time) == 0).any():  # a row twice: rounding makes no two times equal
         return time, []
@@ -191,6 +194,15 @@ def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array,
             text = f"Times are rounded to {rounded_to:g} s in the file: taken as an even {rate:.6g} Hz."
             return even, [note("recording", text)]
     return time, []
+
+
+def _lacks_rows(steps: Array) -> bool:
+    """Whether some steps are whole multiples of all others, too seldom for it to come from rounding, which would do so
+    again and again."""
+    step = float(np.median(steps))
+    longer = np.count_nonzero(steps > 1.5 * step)
+    whole = np.abs(steps - step * np.rint(steps / step if step > 0.0 else steps)).max() < 1e-6 * step
+    return bool(0 < longer < _AGAIN and whole and steps.min() > 0.5 * step)
 
 
 def check_time(time: Array, lines: Sequence[int], path: Path) -> None:

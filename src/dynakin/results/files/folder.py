@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dynakin.errors import OutputError
-from dynakin.files import expanded, is_text
+from dynakin.files import expanded, is_text, unfinished
 
 OUTPUT_FILES = (
     "coordinates.mot",
@@ -120,8 +120,9 @@ def replacing(folder: Path, *, kind: FolderKind = RESULTS, overwrite: bool = Tru
     made: Path | None = None
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        made = Path(tempfile.mkdtemp(prefix=".dynakin-", dir=target.parent))
-        made.chmod(0o755)  # mkdtemp makes it private, results are ordinary files
+        made = unfinished(target.parent)
+        made.mkdir()
+        made.chmod(0o755)  # results are ordinary files
         yield made
         _swap(made, target)
         made = None

@@ -138,7 +138,7 @@ def load_sensors(name_or_path: str) -> SensorNoise:
             f"simulation: sensors is {name_or_path!r}, expected {', '.join(PRESETS)} or a .toml file that exists"
         )
     try:
-        values = tomllib.loads(read_bytes(path, ConfigError, LARGEST_TEXT).decode())
+        values = tomllib.loads(read_bytes(path, ConfigError, LARGEST_TEXT).decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise ConfigError(f"{path}: cannot be read as TOML ({error})") from None
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from dynakin.settings.strict import nearest
 # Keys of their own; all others are those of a run's configuration and hold for everything below them.
 _OF_DATASET = ("subjects", "trials", "presets")
 _OF_SUBJECT = ("name", "folder", "trials")
+OF_A_TRIAL = ("trial", "forces", "output")  # by which the trials of one person differ
 _NOT_HERE = ("trial", *RECORDED, "grid")
 _PATTERN = "*.c3d"
 # Subjects and trials name folders of the results.
@@ -83,6 +85,31 @@ def read_dataset(path: Path, output: Path | None = None) -> Dataset:
     for session in sessions:
         Settings.of(session.content, f"{path}: {session.name}")
     return Dataset(path, into, tuple(presets), tuple(sessions))
+
+
+def copies(dataset: Dataset) -> dict[str, str]:
+    """Trials that hold what an earlier one does, byte by byte, and are to be worked on alike; by name, the earlier one.
+    A mean would count them twice."""
+    found: dict[str, str] = {}
+    first: dict[tuple[str, ...], str] = {}
+    sizes = [tuple(file.stat().st_size for file in _recorded(session)) for session in dataset.sessions]
+    for session, size in zip(dataset.sessions, sizes, strict=True):
+        if not size or sizes.count(size) < 2:
+            continue
+        how = {key: value for key, value in session.content.items() if key not in OF_A_TRIAL}
+        try:
+            held = [hashlib.sha256(file.read_bytes()).hexdigest() for file in _recorded(session)]
+        except OSError:  # said when it is read
+            continue
+        earlier = first.setdefault((repr(sorted(how.items())), *held), session.name)
+        if earlier != session.name:
+            found[session.name] = earlier
+    return found
+
+
+def _recorded(session: Session) -> list[Path]:
+    named = [Path(str(session.content[key])) for key in ("trial", "forces") if key in session.content]
+    return [file for file in named if is_file(file)]
 
 
 def check_presets(names: Sequence[str], where: str) -> None:

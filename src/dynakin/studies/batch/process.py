@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -128,35 +129,46 @@ TRIALS = "trials"
 def belongs_to(dataset: Dataset, options: Options, *, identify: bool = False) -> dict[str, Any]:
     """All that the rows of a batch depend on, for its journal: settings, and the files with their sizes and times.
 
+    Files inside the study are named from its folder, so that this may be called from elsewhere, or moved.
+
     Args:
         identify: whether subjects are identified first (`identify_subjects`).
     """
+    folder = dataset.path.parent
     return {
         "what": "batch",
         "version of dynakin": build(),
-        "presets": {name: _stamp(Path(name)) for name in options.presets},
+        "presets": {_inside(folder, name): _stamp(Path(name)) for name in options.presets},
         "--cutoff-hz": options.cutoff_hz,
         "results of single trials": options.files,
         "--identify": identify,
-        TRIALS: {s.name: _but_output(s.content) | {"files": _stamps(s.content)} for s in dataset.sessions},
+        TRIALS: {s.name: _depends_on(s.content, folder) for s in dataset.sessions},
     }
-
-
-def _but_output(content: Mapping[str, Any]) -> dict[str, Any]:
-    """A folder of results may be moved."""
-    return {key: value for key, value in content.items() if key != "output"}
 
 
 FILES = ("trial", "forces", "static", "parameters", "model", "markers", "table", "preset")
 """Keys that name files, or may."""
 
 
-def _stamps(content: Mapping[str, Any]) -> dict[str, str]:
-    """Size and time of each file, by its name: a file that was changed has others."""
-    named = [content.get(key, "") for key in FILES]
+def _depends_on(content: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """A trial's keys, and size and time of each of its files: one that was changed has others. Not the folder of
+    results, which may be moved."""
+    named: dict[str, Any] = {key: _inside(folder, str(content[key])) for key in FILES if key in content}
+    files = [str(content[key]) for key in FILES if key in content]
     functional = content.get("functional")
-    named += functional.values() if isinstance(functional, Mapping) else []
-    return {str(name): stamp for name in named if (stamp := _stamp(Path(str(name))))}
+    if isinstance(functional, Mapping):
+        files += map(str, functional.values())
+        named["functional"] = {joint: _inside(folder, str(file)) for joint, file in functional.items()}
+    stamps = {_inside(folder, name): stamp for name in files if (stamp := _stamp(Path(name)))}
+    return {key: value for key, value in content.items() if key != "output"} | named | {"files": stamps}
+
+
+def _inside(folder: Path, name: str) -> str:
+    """A file from a study's folder where it lies in there, else in full; a name (of a preset, say) as it is."""
+    if Path(name).name == name and not Path(name).is_file():
+        return name
+    file, of = (Path(os.path.normpath(path.absolute())) for path in (Path(name), folder))
+    return file.relative_to(of).as_posix() if file.is_relative_to(of) else str(file)
 
 
 def _stamp(file: Path) -> str:

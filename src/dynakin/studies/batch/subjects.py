@@ -19,7 +19,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.settings import presets
 from dynakin.settings.lag import can_smooth
 from dynakin.settings.settings import Settings
-from dynakin.studies.batch.dataset import Dataset, Session
+from dynakin.studies.batch.dataset import OF_A_TRIAL, Dataset, Session
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool, work
 from dynakin.studies.engine.tasks import Outcome, Task
@@ -29,7 +29,6 @@ FILE = "subject.toml"
 """What identification writes into a subject's folder, and what its trials take as `parameters`."""
 MOST_TRIALS = 8
 """Each trial more costs a fit of all others; a person's first eight show what a table does not know."""
-_OWN = ("trial", "forces", "output")  # keys by which the trials of one person differ
 
 
 @dataclass(frozen=True)
@@ -183,4 +182,4 @@ def _measured(estimator: Estimator, case: Case, reference: Recording) -> Common:
 
 
 def _shared(content: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in content.items() if key not in _OWN}
+    return {key: value for key, value in content.items() if key not in OF_A_TRIAL}
