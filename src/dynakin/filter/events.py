@@ -25,9 +25,9 @@ FOUND_S = 0.05
 """While a segment that comes into sight again is found, markers beside it may be refused: of an arm in a squat both at
 the wrist for 0.02 s."""
 
-AT_LIMIT_S = 0.08
+AT_LIMIT_S = 0.12
 """So long the filter must hold an angle at the end of its range for the range to be in the way: by truth forearms at
-the end of theirs are held for 0.06 s at most, ankles 4 deg beyond it for 0.09 s, hips 10 deg beyond for 0.35 s."""
+the end of theirs are held for 0.02 to 0.11 s, hips 10 deg beyond it for 0.18 to 0.35, an ankle 6 deg beyond for 0.3."""
 
 
 def events_of(data: xr.Dataset, parameters: list[Parameter], initial: CalibratedModel, unseen_sd: float) -> list[Event]:
