@@ -103,7 +103,7 @@ def test_check_promises_what_run_keeps(data_dir: Path, tmp_path: Path, capsys: S
     first = said[: said.index(moments["verdict"])]
     for words in ("fullbody (the default", "plug-in-gait", "Mass 85.00 kg: from the file", "plate 2 and plate 4 under"):
         assert words in first and words in found
-    assert "right: plate 4 0.33 to 1.06 s; plate 2 1.35 to 2.12 s; off the plates 2.42 to 2.68 s." in found
+    assert "right: plate 4 0.33 to 1.03 s; plate 2 1.35 to 2.12 s; off the plates 2.42 to 2.68 s." in found
     assert "--static Static_trial.c3d (found next to the recording)" in found
 
 

@@ -49,8 +49,8 @@ def test_compare_judges_a_body_in_space_by_what_it_has_not_seen(motion: str, tmp
     assert float(weight["rms"]) < given
 
 
-@pytest.mark.xfail(strict=True, reason="plates are said to carry 10 % more than the motion needs, and are not used")
 def test_plates_of_a_walk_are_used_with_cameras_of_15_hz() -> None:
+    """They were said to carry 10 % more than the motion needs."""
     walk = simulate("fullbody", "gait", 3, 5.0, 15.0).recording
     ready = Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))).prepare(walk)
     assert np.isfinite(ready.measured.wrench).all(axis=1).sum() > 10

@@ -18,14 +18,14 @@ def test_a_limit_that_only_the_filter_met_is_told_where_it_was_in_the_way() -> N
     person: Any = SimpleNamespace(spec=spec(), lower=np.full(30, -0.7), upper=np.full(30, 0.7))
     names = free_names(person.spec)
     state, held = np.zeros((100, 30)), np.zeros((100, len(names)), dtype=bool)
-    held[10:24, names.index("turn")] = True  # 0.14 s
+    held[10:22, names.index("turn")] = True  # 0.12 s
     for first in range(0, 90, 12):
         held[first : first + 10, names.index("knee")] = True  # 0.1 s, again and again: noise at the end of the range
     state[50:52, names.index("flexion")] = 0.7
     data = xr.Dataset(
         {"at_limit": (("time", "coordinate"), held), "state": (("time", "element"), state)},
-        coords={"time": 0.01 * np.arange(100), "coordinate": list(names)},
+        coords={"time": 5.0 + 0.01 * np.arange(100), "coordinate": list(names)},
     )
     found = {event.subject: event.message for event in _coordinates_at_bounds(data, person)}
     assert found.keys() == {"turn", "flexion"}
-    assert found["turn"].startswith("held at its joint limit for 14 frames")
+    assert found["turn"].startswith("held at its joint limit for 12 frames")

@@ -156,6 +156,20 @@ def test_a_plate_that_drifts_below_nothing_keeps_it_in_mind(tmp_path: Path) -> N
     assert np.abs(found.force[~loaded]).max() < 1.0 and np.linalg.norm(found.force - clean.force, axis=1).max() > 10.0
 
 
+def test_a_sample_that_is_missing_takes_no_other_with_it(tmp_path: Path) -> None:
+    """Of a moment's channel: its median over the idle frames was none."""
+    off = np.full(PUSH.shape[1], -20.0)
+    off[40:60] = np.nan
+    found, said = plate_of(tmp_path / "a.c3d", off)
+    assert len(said) == 1 and np.isfinite(found.wrench).all(axis=1).mean() > 0.8
+
+
+def test_a_plate_that_pulls_is_empty_there_whatever_it_reads_otherwise(tmp_path: Path) -> None:
+    off = np.where(np.arange(PUSH.shape[1]) > 0.9 * PUSH.shape[1], -300.0, 4.0)
+    found, _ = plate_of(tmp_path / "a.c3d", off)
+    assert np.abs(found.force[-3:]).max() == 0.0
+
+
 def test_what_may_be_a_light_load_is_left_to_the_markers(tmp_path: Path) -> None:
     found, said = plate_of(tmp_path / "a.c3d", 8.0)
     up = int(np.argmax(found.force.mean(axis=0)))

@@ -13,6 +13,7 @@ from dynakin.messages import Message, about, notes_of, warnings_of
 from dynakin.model.markers.fit import fits
 from dynakin.pipeline.stages import prepare_case
 from dynakin.recordings.companions import companion_forces, companion_static
+from dynakin.recordings.pushes import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import plural, sentence, words
 from dynakin.settings.settings import Settings
@@ -67,7 +68,7 @@ def recording_rows(recording: Recording) -> Rows:
         if not np.isfinite(size).any():
             rows.append(("Plates", f"{plate.name}: not measured."))
             continue
-        loaded = 100.0 * float(np.mean(np.isfinite(plate.cop).all(axis=1)))
+        loaded = 100.0 * float(np.mean(np.nan_to_num(size) > LOADED_N))
         text = f"{plate.name}: up to {np.nanmax(size):.0f} N, mean {np.nanmean(size):.1f} N, loaded {loaded:.0f} %."
         rows.append(("Plates", text))
     return [*rows, *(("Note", short(message)) for message in recording.notes)]

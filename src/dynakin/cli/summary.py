@@ -33,7 +33,7 @@ def print_summary(result: Result, folder: Path) -> None:
     for name, found in (metrics["contacts"] or {}).items():
         console.print(f"  {_contact_in_words(name, found)}", style="dim")
     console.print(_figures(estimate, metrics))
-    for message in notes_of(about(estimate.messages, "smoothing", "in step", "carried")):
+    for message in notes_of(about(estimate.messages, "smoothing", "in step", "zero", "carried")):
         console.print(str(message))
     _print_verdict(console, insights(estimate, metrics), moments["reasons"])
     console.print(f"Results  {folder}", soft_wrap=True)

@@ -12,7 +12,7 @@ from dynakin.bindings import _core
 from dynakin.filter.sight import owners_of, root_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_names
-from dynakin.recordings.times import span
+from dynakin.recordings.times import span, step_of
 from dynakin.results.measures.sources import out_of_sight, taken_back
 from dynakin.results.records import REFUSED, TRACKING, Event, EventKind, Parameter
 
@@ -139,13 +139,14 @@ def _coordinates_at_bounds(data: xr.Dataset, initial: CalibratedModel) -> list[E
     """By what is reported, and by the filter's own frames: smoothed, an angle that these held lies inside, as frames
     before and after pull at it, and skin has what it may not."""
     time, events = data["time"].values, list[Event]()
+    least = AT_LIMIT_S - 0.5 * step_of(time)  # times are rounded
     place = {name: k for k, name in enumerate(free_names(initial.spec))}  # the state begins with them
     for name, held in zip((str(name) for name in data["coordinate"].values), data["at_limit"].values.T, strict=True):
         if name not in place:
             continue
         k, held = place[name], held.copy()
         for first, end in runs(held):
-            held[first:end] = (end - first) * np.median(np.diff(time)) >= AT_LIMIT_S
+            held[first:end] = (end - first) * step_of(time) > least
         angle = data["state"].values[:, k]
         held |= (angle <= initial.lower[k]) | (angle >= initial.upper[k])
         events += _stretches(time, held, "at_bound", name, "held at its joint limit")

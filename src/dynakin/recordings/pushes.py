@@ -13,6 +13,8 @@ NOISE_N = 3.0
 JUDGED_N = 50.0
 """Push from which something is said of a plate: a load where no foot stands, a force beyond friction, standing. What is
 lighter may be a cable, a step on the edge, a drift; no offset of a plate in order reaches it."""
+LASTING_PULL = 0.02
+"""Part of a recording in which a plate may pull by more than that: edges that ring, single samples."""
 MOST_OFFSET_N = 2.0 * JUDGED_N
 """What a plate reads beside the load, at most: a press that stays below it may be nobody's, and shows no place."""
 BEARS_N = 200.0

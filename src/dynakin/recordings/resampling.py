@@ -214,7 +214,8 @@ class ReadOptions:
         plate_filter_hz: low-pass all plates at this frequency (4th-order zero-lag Butterworth, -3 dB there;
             2nd order one way if causal), besides what resampling needs; None: no filter of its own.
         force_threshold_n: push along the plate's normal below which a plate's wrench is set to 0, N. None: 10
-            N for plates that are resampled, while a force file at the marker rate passes through untouched.
+            N for plates that are resampled, but for those that read something else than noise while they are empty,
+            of which markers say whose it is; a force file at the marker rate passes through untouched.
         causal: only filters that look back, as in live use (they delay; the notes say by how much).
     """
 

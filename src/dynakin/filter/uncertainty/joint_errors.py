@@ -207,6 +207,7 @@ def _sources(
         name, R_B = segment.name, orientations[segment.name]
         children = [child for child in spec.segments if child.parent == name]
         jointed = [child for child in children if child.name in joints]
+        limb = any(axis.kind == "rotation" for child in children for axis in child.axes)
         if segment.parent == "ground":
             if not planar and floats(segment):
                 kinds: tuple[Kind, ...] = ("root_frame", "root_frame", "frame_tilt")
@@ -227,7 +228,7 @@ def _sources(
             if name in trunks:
                 found.append(("frame_tilt", name, _frame_turned(name, R_B, jointed, R_B.T[2])))
             both = [_along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e) for e in _AXES]
-            turned = "shoulder_axes" if segment.parent in trunks and jointed else _TURNED[axes]
+            turned = "shoulder_axes" if segment.parent in trunks and limb else _TURNED[axes]
             found += [(turned, name, column) for column in both]
     return found
 

@@ -31,7 +31,7 @@ from dynakin.recordings.plates.axes import pulling, turned_in_words
 from dynakin.recordings.plates.dead import Channels, dead_channels
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench, read_while_empty
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words
-from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
+from dynakin.recordings.pushes import JUDGED_N, LASTING_PULL, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import (
     CausalLowPass,
@@ -45,7 +45,7 @@ from dynakin.recordings.resampling import (
 )
 
 _MOST_PLATES = 100
-_LASTING_PULL, _OFFSET_WORTH_A_NOTE_N = 0.02, 5.0
+_OFFSET_WORTH_A_NOTE_N = 5.0
 _STEADY = 0.8
 """Part of what is read without a load that must be the same to `UNLOADED_N` for it to be the plate's zero."""
 _LEAST_SURFACE_M2 = 1e-4
@@ -344,15 +344,15 @@ def _at_zero(raw: _Raw) -> tuple[_Raw, float, list[Message]]:
     push = raw.force @ raw.surface.normal
     known, reads = np.nan_to_num(push, nan=np.inf), read_while_empty(push)
     pulls = known < -JUDGED_N
-    if pulls.mean() > _LASTING_PULL:
+    if pulls.mean() > LASTING_PULL:
         text = (
             f"{raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in {100.0 * pulls.mean():.0f} % "
             "of the recording: taken as empty there. Zero it before the trial."
         )
-        return raw, reads, [warning("plates", text)]
+        return raw, min(reads, 0.0), [warning("plates", text)]
     own = np.abs(known - reads) < UNLOADED_N
     if reads < 0.0 and np.count_nonzero(own) >= _STEADY * np.count_nonzero(known < JUDGED_N):
-        force, moment = (values - np.median(values[own], axis=0) for values in (raw.force, raw.moment))
+        force, moment = (values - np.nanmedian(values[own], axis=0) for values in (raw.force, raw.moment))
         text = f"{raw.name} reads {reads:.3g} N where nobody stands on it: it is taken off over the whole trial."
         said = (warning if -reads > UNLOADED_N else note)("zero", text)
         return replace(raw, force=force, moment=moment), 0.0, [said]

@@ -16,7 +16,7 @@ from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.axes import pulling, turned_in_words
 from dynakin.recordings.plates.pressure import Surface, main_axis, plate_from_wrench, read_while_empty
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
-from dynakin.recordings.pushes import LOADED_N, UNLOADED_N
+from dynakin.recordings.pushes import JUDGED_N, LASTING_PULL, LOADED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.resampling import UNEVEN, ReadOptions, low_pass, reach_s, resample, same_times, touched
 from dynakin.recordings.times import rate_of, settled_times, spans, step_of
@@ -298,9 +298,14 @@ def _resampled(plate: Plate, table: Table, time: Array, options: ReadOptions) ->
         surface,
         corners=None,
         threshold_n=threshold,
-        # markers will say whether what it reads while it is empty is a light load, or under a foot as well
-        zero_unloaded=options.force_threshold_n is not None or not read_while_empty(wrench[:, :3] @ surface.normal),
+        zero_unloaded=options.force_threshold_n is not None or not _has_an_offset(wrench[:, :3] @ surface.normal),
     )
+
+
+def _has_an_offset(push: Array) -> bool:
+    """Whether markers are to say if what a plate reads while it is empty is a light load, or under a foot as well; of a
+    plate that pulls more than an offset does nobody knows."""
+    return bool(read_while_empty(push)) and not (push < -JUDGED_N).mean() > LASTING_PULL
 
 
 def _surface(plate: Plate) -> Surface | None:

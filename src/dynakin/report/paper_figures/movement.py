@@ -280,8 +280,10 @@ def repetitions_figure(
         titles = (plot.title, note_of(estimate, plot.curves[0][1]))
         axes.set_title("\n".join(textwrap.fill(text, 28) for text in titles if text), fontsize=7.5)
     shown = [curve for plot in plots for _, curve in plot.curves]
-    n = int(max(curve.n.max() for curve in shown))
-    figure.supxlabel(f"{percent_label(shown[0].movement)}, n = {n}", fontsize=8, color=QUIET)
+    most = [int(curve.n.max()) for curve in shown]
+    n, least = max(most), min(most)
+    of = f"n = {n}" if least == n else f"n = {least} to {n}"
+    figure.supxlabel(f"{percent_label(shown[0].movement)}, {of}", fontsize=8, color=QUIET)
     styles = {style.label: style for plot in plots for style, _ in plot.curves}
     key = [replace(style, label=label or "middle") for label, style in styles.items()]
     _key(figure, panels[0], key, band=_band_colour(key) if n > 1 else "", what=ONE_SD, columns=5)

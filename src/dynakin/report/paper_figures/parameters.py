@@ -121,6 +121,7 @@ def _draw_bounds(axes: Axes, bounds: Sequence[tuple[float, Parameter]]) -> None:
             va="bottom" if up else "top",
             color=LIMIT,
             fontsize=7,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
         )
 
 

@@ -148,7 +148,8 @@ def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float)
     """What is said goes by the numbers: nothing is left only where nothing is."""
     left, text = figures["left_at_root"], []
     if left["grounded"] is None:
-        text.append("In no frame are all contacts with the ground measured: the residual at the root is not known.")
+        where = "In no frame" if not grounded else "In no frame but those at the recording's ends"
+        text.append(f"{where} are all contacts with the ground measured: the residual at the root is not known.")
     else:
         where = f"in the {grounded} of {frames} frames in which every contact with the ground is measured"
         if max(left["grounded"].values()) <= ROUNDING:
