@@ -60,7 +60,8 @@ def read_while_empty(push: Array) -> float:
     noise, or where there are too few."""
     known = np.nan_to_num(push, nan=np.inf)
     idle = (known > -MOST_OFFSET_N) & (known < JUDGED_N)
-    middle = float(np.median(push[idle])) if idle.mean() >= _LEAST_IDLE else 0.0
+    enough = np.count_nonzero(idle) >= max(_LEAST_IDLE * len(push), 1.0)
+    middle = float(np.median(push[idle])) if enough else 0.0
     return middle if abs(middle) > NOISE_N else 0.0
 
 
