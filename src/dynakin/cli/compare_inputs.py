@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 
 from dynakin.cli.options import Given
 from dynakin.cli.prepared import forces_beside
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.messages import Message, note
-from dynakin.recordings.companions import is_copy
+from dynakin.recordings.companions import copies_among
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import plural
 from dynakin.settings.settings import Settings, read_keys
@@ -84,11 +83,10 @@ def refuse_copies_of(cases: Sequence[Case]) -> None:
     Raises:
         RecordingError: two trials are one recording; both are named.
     """
-    for one, other in combinations([case.recording for case in cases], 2):
-        if is_copy(one, other):
-            where = [str(recording.path or recording.name) for recording in (one, other)]
-            twice = f"{where[0]} is given twice" if where[0] == where[1] else f"{' and '.join(where)} are one recording"
-            raise RecordingError(f"compare: {twice} (the markers are the same), expected different trials")
+    if found := copies_among([case.recording for case in cases]):
+        one, other = (str(recording.path or recording.name) for recording in found)
+        twice = f"{one} is given twice" if one == other else f"{one} and {other} are one recording"
+        raise RecordingError(f"compare: {twice} (the markers are the same), expected different trials")
 
 
 def refuse_without_plates(cases: Sequence[Case]) -> None:

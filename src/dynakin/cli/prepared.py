@@ -111,9 +111,6 @@ def short(message: Message) -> Message:
     return replace(message, text=f"{head}{colon}{', '.join(parts[:_KEPT])} and {len(parts) - _KEPT} more.")
 
 
-_FOLLOW = "ground reactions follow from the motion"
-
-
 def forces_beside(recording: Recording) -> str:
     """That a table of ground forces lies next to a recording; "" where there is none."""
     forces = None if recording.path is None else companion_forces(recording.path)
@@ -130,7 +127,8 @@ def _sides(ready: Prepared) -> str:
 def _plates(ready: Prepared) -> str:
     plates, loads = ready.recording.plates, ready.ground.loads
     if not plates:
-        return f"none; {beside}." if (beside := forces_beside(ready.recording)) else f"none: {_FOLLOW}."
+        beside = forces_beside(ready.recording)
+        return f"none; {beside}." if beside else "none: ground reactions follow from the motion."
     if loads is None:
         return f"{plural(len(plates), 'plate')}, their sum is used."
     bears = [

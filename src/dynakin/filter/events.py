@@ -138,17 +138,12 @@ def _held(data: xr.Dataset, unseen_sd: float) -> list[Event]:
 def _coordinates_at_bounds(data: xr.Dataset, initial: CalibratedModel) -> list[Event]:
     """By what is reported, and by the filter's own frames: smoothed, an angle that these held lies inside, as frames
     before and after pull at it, and skin has what it may not."""
-    time, events = data["time"].values, list[Event]()
-    least = AT_LIMIT_S - 0.5 * step_of(time)  # times are rounded
-    place = {name: k for k, name in enumerate(free_names(initial.spec))}  # the state begins with them
-    for name, held in zip((str(name) for name in data["coordinate"].values), data["at_limit"].values.T, strict=True):
-        if name not in place:
-            continue
-        k, held = place[name], held.copy()
-        for first, end in runs(held):
-            held[first:end] = (end - first) * step_of(time) > least
-        angle = data["state"].values[:, k]
-        held |= (angle <= initial.lower[k]) | (angle >= initial.upper[k])
+    time, state, events = data["time"].values, data["state"].values, list[Event]()
+    least = AT_LIMIT_S / step_of(time) - 0.5  # frames; times are rounded
+    for k, name in enumerate(free_names(initial.spec)):  # the state begins with them
+        held = (state[:, k] <= initial.lower[k]) | (state[:, k] >= initial.upper[k])
+        for first, end in runs(data["at_limit"].sel(coordinate=name).values):
+            held[first:end] |= end - first > least
         events += _stretches(time, held, "at_bound", name, "held at its joint limit")
     return events
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +20,7 @@ from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
-from dynakin.recordings.companions import another_person, is_copy
+from dynakin.recordings.companions import another_person, copies_among
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
@@ -283,12 +282,12 @@ def refuse_copies(recordings: Sequence[Recording]) -> None:
     Raises:
         RecordingError: the markers of two recordings are the same; both are named.
     """
-    for one, other in combinations(recordings, 2):
-        if is_copy(one, other):
-            raise RecordingError(
-                f"{one.path or one.name} and {other.path or other.name}: the markers are the same, one is a copy; "
-                "expected different trials: each is held out in turn"
-            )
+    if found := copies_among(recordings):
+        one, other = found
+        raise RecordingError(
+            f"{one.path or one.name} and {other.path or other.name}: the markers are the same, one is a copy; "
+            "expected different trials: each is held out in turn"
+        )
 
 
 def measure_all(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -112,10 +113,13 @@ def another_person(trial: Recording, other: Recording) -> str:
     )
 
 
-def is_copy(one: Recording, other: Recording) -> bool:
-    """Whether the markers of two recordings are the same, as no two movements are."""
-    alike = one.marker_names == other.marker_names and one.markers.shape == other.markers.shape
-    return alike and np.allclose(one.markers, other.markers, rtol=0.0, atol=_SAME_PLACE_M, equal_nan=True)
+def copies_among(recordings: Sequence[Recording]) -> tuple[Recording, Recording] | None:
+    """Two recordings whose markers are the same, as no two movements are; None where there are none."""
+    for one, other in combinations(recordings, 2):
+        alike = one.marker_names == other.marker_names and one.markers.shape == other.markers.shape
+        if alike and np.allclose(one.markers, other.markers, rtol=0.0, atol=_SAME_PLACE_M, equal_nan=True):
+            return one, other
+    return None
 
 
 def of_most(trials: Sequence[Recording], static: Recording | None = None) -> Recording:

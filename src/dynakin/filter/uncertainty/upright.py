@@ -81,8 +81,12 @@ def followed(q: Array, calibrated: CalibratedModel) -> Array:
 
 def rolls(spec: _core.ModelSpec) -> list[str]:
     """Lengths by which the centre of a joint moves with its angle, as elements of the state."""
-    axes = [axis for segment in spec.segments for axis in segment.axes if axis.kind == "translation"]
-    return [f"length/{scale}" for scale in dict.fromkeys(a.scale for a in axes if a.coordinate and a.scale)]
+    axes = [axis for segment in spec.segments for axis in segment.axes]
+    return [f"length/{scale}" for scale in dict.fromkeys(axis.scale for axis in axes if _rolls(axis))]
+
+
+def _rolls(axis: _core.AxisSpec) -> bool:
+    return bool(axis.kind == "translation" and axis.coordinate and axis.scale)
 
 
 def rolling_more(spec: _core.ModelSpec) -> _core.ModelSpec:
@@ -92,7 +96,7 @@ def rolling_more(spec: _core.ModelSpec) -> _core.ModelSpec:
     for segment in segments:
         axes = segment.axes
         for axis in axes:
-            if axis.kind == "translation" and axis.coordinate and axis.scale:
+            if _rolls(axis):
                 axis.coefficients = [0.0, *axis.coefficients]
         segment.axes = axes
     spec.segments = segments

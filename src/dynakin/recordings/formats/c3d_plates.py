@@ -29,7 +29,7 @@ from dynakin.recordings.formats.c3d_plate_units import (
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.axes import pulling, turned_in_words
 from dynakin.recordings.plates.dead import Channels, dead_channels
-from dynakin.recordings.plates.pressure import Surface, plate_from_wrench, read_while_empty
+from dynakin.recordings.plates.pressure import Surface, part_pulling, plate_from_wrench, read_while_empty
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words
 from dynakin.recordings.pushes import JUDGED_N, LASTING_PULL, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate
@@ -343,10 +343,10 @@ def _at_zero(raw: _Raw) -> tuple[_Raw, float, list[Message]]:
     reads, N (0: noise; above 0 markers say whether that is somebody's load); and what there is to say."""
     push = raw.force @ raw.surface.normal
     known, reads = np.nan_to_num(push, nan=np.inf), read_while_empty(push)
-    pulls = known < -JUDGED_N
-    if pulls.mean() > LASTING_PULL:
+    pulls = part_pulling(push)
+    if pulls > LASTING_PULL:
         text = (
-            f"{raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in {100.0 * pulls.mean():.0f} % "
+            f"{raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in {100.0 * pulls:.0f} % "
             "of the recording: taken as empty there. Zero it before the trial."
         )
         return raw, min(reads, 0.0), [warning("plates", text)]

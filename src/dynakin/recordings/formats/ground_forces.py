@@ -14,9 +14,9 @@ from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, 
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.axes import pulling, turned_in_words
-from dynakin.recordings.plates.pressure import Surface, main_axis, plate_from_wrench, read_while_empty
+from dynakin.recordings.plates.pressure import Surface, main_axis, part_pulling, plate_from_wrench, read_while_empty
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
-from dynakin.recordings.pushes import JUDGED_N, LASTING_PULL, LOADED_N, UNLOADED_N
+from dynakin.recordings.pushes import LASTING_PULL, LOADED_N, UNLOADED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.resampling import UNEVEN, ReadOptions, low_pass, reach_s, resample, same_times, touched
 from dynakin.recordings.times import rate_of, settled_times, spans, step_of
@@ -305,7 +305,7 @@ def _resampled(plate: Plate, table: Table, time: Array, options: ReadOptions) ->
 def _has_an_offset(push: Array) -> bool:
     """Whether markers are to say if what a plate reads while it is empty is a light load, or under a foot as well; of a
     plate that pulls more than an offset does nobody knows."""
-    return bool(read_while_empty(push)) and not (push < -JUDGED_N).mean() > LASTING_PULL
+    return bool(read_while_empty(push)) and not part_pulling(push) > LASTING_PULL
 
 
 def _surface(plate: Plate) -> Surface | None:

@@ -65,6 +65,11 @@ def read_while_empty(push: Array) -> float:
     return middle if abs(middle) > NOISE_N else 0.0
 
 
+def part_pulling(push: Array) -> float:
+    """Part of the samples (T,) in which a plate pulls by more than an offset does, as no plate in order can."""
+    return float(np.mean(np.nan_to_num(push) < -JUDGED_N))
+
+
 def plate_from_wrench(
     name: str,
     force: Array,

@@ -18,13 +18,12 @@ from dynakin.report.chart import band_is_too_wide
 from dynakin.report.figure import draw_sourced
 from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.sections.repetitions import (
-    LEAST_PER_KG,
-    LEAST_RANGE,
     ONE_SD,
     Plot,
     curve_unit,
     drawn,
     kind_of,
+    least_range,
     note_of,
     percent_label,
     plots_by_method,
@@ -260,7 +259,7 @@ def repetitions_figure(
     """Joint angles, moments or wrench over 0 to 100 % of a repetition: mean, and one standard deviation as a band.
 
     As in the report: in a plane by method, in space legs and trunk, right and left over each other. Left out is what
-    moves by less than a panel's axis spans at least (`LEAST_RANGE`).
+    moves by less than a panel's axis spans at least (`least_range`).
 
     Args:
         kind: one of `KINDS`.
@@ -298,7 +297,7 @@ def _band_colour(styles: Sequence[LineStyle]) -> str:
 
 def _shows(plot: Plot) -> bool:
     """Whether any of its curves moves by more than the panel's axis spans at least."""
-    least = LEAST_RANGE.get(plot.curves[0][1].unit, LEAST_PER_KG)
+    least = least_range(plot.curves[0][1])
     return any(
         np.nanmax(mean) - np.nanmin(mean) >= least for mean, _ in (drawn(c) for _, c in plot.curves if c.n.any())
     )

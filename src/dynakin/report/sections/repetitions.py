@@ -21,9 +21,6 @@ from dynakin.units import COMPONENTS
 
 KINDS = {"angles": "Coordinates", "moments": "Moments, per kg", "wrench": "Ground reaction, per kg"}
 ONE_SD = "± 1 standard deviation"
-LEAST_RANGE = {"deg": 2.0, "mm": 10.0}
-LEAST_PER_KG = 0.02
-"""Range of a panel's axis at least, by the unit of its curves; of moments and forces, N m/kg and N/kg."""
 
 
 @dataclass(frozen=True)
@@ -200,9 +197,13 @@ def _panel(plot: Plot) -> Panel:
         band = 0.5 * sd if style.band and curve.n.max() > 1 else None  # a chart's band is two wide
         lines.append(Line(mean, style.colour, style.width, band, dashes=style.dashes))
     first = plot.curves[0][1]
-    least = LEAST_RANGE.get(first.unit, LEAST_PER_KG)
-    label = percent_label(first.movement)
+    label, least = percent_label(first.movement), least_range(first)
     return chart(plot.title, curve_unit(first), PERCENT, lines, note=plot.note, least_range=least, x_label=label)
+
+
+def least_range(curve: MeanCurve) -> float:
+    """Range of its panel's axis at least, in the curve's unit; of moments and forces N m/kg and N/kg."""
+    return {"deg": 2.0, "mm": 10.0}.get(curve.unit, 0.02)
 
 
 def drawn(curve: MeanCurve) -> tuple[np.ndarray, np.ndarray]:
