@@ -12,6 +12,7 @@ import xarray as xr
 import dynakin
 from dynakin.cli.app import main
 from dynakin.errors import ConfigError, OutputError
+from dynakin.report.insights import in_short, insights
 from dynakin.report.paper_figures.figures import FIGURES
 from dynakin.results.files.folder import OUTPUT_FILES
 from dynakin.settings.settings import Settings
@@ -130,6 +131,9 @@ def test_a_result_as_a_researcher_takes_it(from_python: dynakin.Result) -> None:
     for wrong in (None, 3):
         with pytest.raises(ConfigError, match=f"no quantity {wrong}, expected one of coordinates"):
             from_python.to_dataframe(wrong)  # type: ignore[arg-type]
+    shown = from_python._repr_html_()
+    assert "<b>markers</b>" in shown and in_short(insights(estimate, from_python.metrics())) in shown
+    assert from_python.plot("moments").axes
     cycles = from_python.cycles
     assert cycles and all(one.movement == "squat" and one.end_s > one.start_s for one in cycles)
     assert from_python.events == estimate.events and from_python.failures.found == []

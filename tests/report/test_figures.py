@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError, OutputError
-from dynakin.report.paper_figures.figures import FIGURES, save_figures
+from dynakin.report.paper_figures.figures import FIGURES, draw_figure, save_figures
 from dynakin.report.paper_figures.movement import middle_cycle
 from dynakin.report.paper_figures.parameters import spread
 from dynakin.results.estimate import Estimate
@@ -62,12 +62,33 @@ def test_formats_and_what_is_left_out(jointed: Estimate, tmp_path: Path) -> None
         "figure4_markers.png",
         "figure5_angles.pdf",
         "figure5_angles.png",
+        "moments.pdf",
+        "moments.png",
         "repetitions_angles.pdf",
         "repetitions_angles.png",
         "repetitions_moments.pdf",
         "repetitions_moments.png",
     ]
     assert written[0].read_bytes()[:4] == b"%PDF"
+
+
+def test_moments_of_all_joints_stand_in_one_figure(saved: Path) -> None:
+    moments = words_in(saved / "moments.svg")
+    assert moments.count("moment, N m") == 1 and "± 2 standard deviations" in moments
+    assert all(f"| {joint} |" in f"| {moments} |" for joint in ("Ankle", "Knee", "Hip", "Shoulder"))
+
+
+def test_one_figure_is_drawn_by_its_name_and_shown_by_a_notebook(jointed: Estimate) -> None:
+    figure = draw_figure("angles", jointed)
+    assert figure._repr_png_()[:4] == b"\x89PNG"
+    assert len(figure.axes) == len(draw_figure("figure5_angles", jointed).axes)
+    with pytest.raises(
+        ConfigError, match=r"no figure 'momnts' \(did you mean 'moments'\?\), expected one of markers, "
+    ):
+        draw_figure("momnts", jointed)
+    bare = replace(jointed, data=jointed.data.assign(moments=jointed.data["moments"] * np.nan))
+    with pytest.raises(ConfigError, match="has nothing to show in 'moments'"):
+        draw_figure("moments", bare)
 
 
 def test_wrong_requests_are_refused(jointed: Estimate, comparison: ComparedTrial, tmp_path: Path) -> None:

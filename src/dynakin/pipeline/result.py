@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
+    from dynakin.report.figure import Figure
     from dynakin.report.paper_figures.sensitivity import Sensitivity
 
 
@@ -61,6 +62,11 @@ class Result:
     def __repr__(self) -> str:
         failed = f", {len(self.failures.found)} late stages failed" if self.failures.found else ""
         return f"<Result: {self.estimate!r}{failed}>"
+
+    def _repr_html_(self) -> str:
+        from dynakin.report.page import render_summary  # Jinja: only who looks waits
+
+        return render_summary(self.estimate, self.metrics())
 
     @property
     def events(self) -> list[Event]:
@@ -91,6 +97,21 @@ class Result:
                 f"other, as {', '.join(tables)} have; estimate.data has it as it is"
             )
         return data.transpose("time", ...).to_pandas()
+
+    def plot(self, figure: str = "angles") -> Figure:
+        """One of the figures that `save_figures` writes, as a Matplotlib figure; a notebook shows it.
+
+        Args:
+            figure: "angles", "moments" (all joints, with their bands, derived values dashed, priors dotted), "wrench",
+                "markers", "knee_moment", "lengths_and_masses", "inertias", "repetitions_angles",
+                "repetitions_moments" or "repetitions_wrench".
+
+        Raises:
+            ConfigError: no such figure, or this run has nothing to show in it.
+        """
+        from dynakin.report.paper_figures.figures import draw_figure  # Matplotlib: only who draws waits
+
+        return draw_figure(figure, self.estimate, self.comparison)
 
     def metrics(self) -> dict[str, Any]:
         """What ``metrics.json`` holds: the figures (see `dynakin.results.measures.metrics`; computed once, a copy is
@@ -173,7 +194,7 @@ class Result:
         Raises:
             ConfigError: an unknown format. OutputError: the folder cannot be written.
         """
-        from dynakin.report.paper_figures.figures import save_figures  # Matplotlib: only who draws waits
+        from dynakin.report.paper_figures.figures import save_figures  # as above
         from dynakin.report.paper_figures.saving import FORMATS
 
         return save_figures(

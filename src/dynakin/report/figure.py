@@ -7,9 +7,9 @@ import re
 from typing import Any
 
 import matplotlib as mpl
+import matplotlib.figure
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dynakin.report.styles import GRID, INK, QUIET, by_source, thin
@@ -54,6 +54,16 @@ FILE_STYLE: dict[Any, Any] = {
 _GROUP_ID = re.compile(r' id="(?:figure|axes|patch|matplotlib\.axis|xtick|ytick|line2d|text|[A-Za-z]+Collection)_\d+"')
 _TAG = re.compile(r"<[^>]*>")
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
+
+
+class Figure(matplotlib.figure.Figure):
+    """A figure that a notebook shows by itself, without pyplot and its list of open figures."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        with mpl.rc_context(FILE_STYLE):
+            self.savefig(buffer, format="png", dpi=144)
+        return buffer.getvalue()
 
 
 def new_axes() -> tuple[Figure, Axes]:

@@ -10,6 +10,7 @@ from typing import Any
 import jinja2
 import tomli_w
 
+from dynakin.report.findings.finding import Insight
 from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import parameter_label, short_marker_names
 from dynakin.report.playback import playback
@@ -82,19 +83,13 @@ def render_report(
     preset = estimate.config.get("preset")
     return render_page(
         "report.html.j2",
+        **_summary(estimate, metrics, found),
         eyebrow="dynakin report",
-        title=estimate.recording.name,
         chips=[
             f"model {estimate.model_name}",
             *([f"preset {preset}"] if preset else []),
             f"dynakin {versions()['dynakin']}",
         ],
-        what_was_run=_what_was_run(estimate),
-        figures=_headline(estimate, metrics),
-        moments=(metrics["moments"] or UNKNOWN)["verdict"],
-        insights=found,
-        in_short=in_short(found),
-        warnings=sum(insight.level == "warning" for insight in found),
         player=playback(estimate),
         sections=sections_of(Page(estimate, metrics, comparison)),
         messages=list(map(str, estimate.messages)),
@@ -102,6 +97,24 @@ def render_report(
         parameters=_parameter_groups(estimate),
         configuration=tomli_w.dumps(plain(estimate.config)),
     )
+
+
+def render_summary(estimate: Estimate, metrics: dict[str, Any]) -> str:
+    """What the report begins with, as a piece of HTML for a notebook: what was run, its figures, warnings in full."""
+    found = insights(estimate, metrics)
+    content = _summary(estimate, metrics, found) | {"insights": [each for each in found if each.level == "warning"]}
+    return render_page("summary.html.j2", **content)
+
+
+def _summary(estimate: Estimate, metrics: dict[str, Any], found: list[Insight]) -> dict[str, Any]:
+    return {
+        "title": estimate.recording.name,
+        "what_was_run": _what_was_run(estimate),
+        "figures": _headline(estimate, metrics),
+        "moments": (metrics["moments"] or UNKNOWN)["verdict"],
+        "insights": found,
+        "in_short": in_short(found),
+    }
 
 
 def sections_of(page: Page) -> list[Section]:

@@ -8,16 +8,16 @@ from functools import partial
 from pathlib import Path
 
 import matplotlib as mpl
-from matplotlib.figure import Figure
 
 from dynakin.errors import ConfigError, OutputError
 from dynakin.files import expanded
 from dynakin.progress import stage
-from dynakin.report.figure import FILE_STYLE
+from dynakin.report.figure import FILE_STYLE, Figure
 from dynakin.report.paper_figures.movement import (
     angles_figure,
     knee_moment_figure,
     markers_figure,
+    moments_figure,
     repetitions_figure,
     wrench_figure,
 )
@@ -28,6 +28,7 @@ from dynakin.report.sections.repetitions import KINDS
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
+from dynakin.settings.strict import nearest
 from dynakin.validation.methods import ComparedTrial
 
 Draw = Callable[[Estimate, ComparedTrial | None], Figure | None]
@@ -38,10 +39,27 @@ FIGURES: dict[str, Draw] = {
     "figure7_knee_moment": knee_moment_figure,
     "figure8_lengths_and_masses": lengths_and_masses_figure,
     "figure9_inertias": inertias_figure,
+    "moments": moments_figure,
     **{f"repetitions_{kind}": partial(repetitions_figure, kind=kind) for kind in KINDS},
 }
 """File name -> what draws it; it gives None where the estimate has nothing to show."""
 SENSITIVITY_FIGURE = "figure3_sensitivity"
+
+
+def draw_figure(name: str, estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure:
+    """One of `FIGURES`, by its name with or without the number that it has in the paper.
+
+    Raises:
+        ConfigError: no such figure, or the estimate has nothing to show in it.
+    """
+    named = {stem.partition("_")[2] if stem.startswith("figure") else stem: draw for stem, draw in FIGURES.items()}
+    if (draw := FIGURES.get(name) or named.get(name)) is None:
+        raise ConfigError(f"plot: no figure {name!r}{nearest(name, named)}, expected one of {', '.join(named)}")
+    with mpl.rc_context(FILE_STYLE):
+        figure = draw(facing(estimate), comparison)
+    if figure is None:
+        raise ConfigError(f"plot: {estimate.recording.name} has nothing to show in {name!r}")
+    return figure
 
 
 def save_figures(

@@ -1,4 +1,5 @@
-"""Figures 4 to 7 of the paper: markers over a cycle, joint angles, wrench, knee moment; and mean curves."""
+"""Figures 4 to 7 of the paper: markers over a cycle, joint angles, wrench, knee moment; all moments, and mean
+curves."""
 
 from __future__ import annotations
 
@@ -10,12 +11,11 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from dynakin.report.body import chain_of, painted
 from dynakin.report.chart import band_is_too_wide
-from dynakin.report.figure import draw_sourced
+from dynakin.report.figure import Figure, draw_sourced
 from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.sections.repetitions import (
     ONE_SD,
@@ -29,7 +29,7 @@ from dynakin.report.sections.repetitions import (
     plots_by_method,
     side_plots,
 )
-from dynakin.report.sides import joints_of, side_lines
+from dynakin.report.sides import Joint, joints_of, side_lines
 from dynakin.report.styles import BAND, ESTIMATED, INK, MEASURED, QUIET, LineStyle, method_styles, source_key
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import signal_fit
@@ -97,10 +97,7 @@ def angles_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -
     styles, alone = side_lines(estimate), estimate.planar
     classical = _reference(comparison, CLASSICAL) if alone else None
     differences = {row.coordinate: row for row in angle_differences([] if comparison is None else [comparison])}
-    columns = min(4, len(joints))
-    rows = -(-len(joints) // columns)
-    figure = Figure(figsize=(7.2, 0.5 + (1.75 if alone else 1.55) * rows), layout="constrained")
-    every = figure.subplots(rows, columns, squeeze=False).ravel()
+    figure, every = _grid(len(joints), 1.75 if alone else 1.55)
     for axes, joint in zip(every, joints, strict=False):
         factor, unit = (180.0 / np.pi, "deg") if joint.rotation else (1000.0, "mm")
         notes = []
@@ -121,15 +118,61 @@ def angles_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -
             axes.set_xlabel("\n".join(notes))
         axes.set_title(f"{joint.title}, {unit}")
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
-    for axes in every[len(joints) :]:
-        axes.set_visible(False)
     figure.supxlabel("time, s", fontsize=8, color=QUIET)
     if alone:
         _key(figure, every[0], [_EKF, *_styles(classical)], band=ESTIMATED)
     else:
-        shown = dict.fromkeys(side for joint in joints for side in joint.columns)
-        _key(figure, every[0], [replace(styles[side], label=side or "middle", width=1.4) for side in shown], band=QUIET)
+        _key(figure, every[0], _side_styles(estimate, joints), band=QUIET)
     return figure
+
+
+def moments_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure | None:
+    """Every joint's moment with its band, right and left over each other: derived values dashed, priors dotted.
+
+    Args:
+        comparison: not drawn; Figure 7 has the table's moments.
+    """
+    moments, source, styles = estimate.values("moments"), moment_sources(estimate.data), side_lines(estimate)
+    sd = estimate.values("moments_sd") if "moments_sd" in estimate.data else np.full_like(moments, np.nan)
+    has = np.isfinite(moments).any(axis=0)
+    joints = [
+        replace(joint, columns={side: k for side, k in joint.columns.items() if has[k]})
+        for joint in joints_of(estimate)
+        if joint.region != "Whole body" and has[list(joint.columns.values())].any()
+    ]
+    if not joints:
+        return None
+    figure, every = _grid(len(joints), 1.55)
+    for axes, joint in zip(every, joints, strict=False):
+        for side, k in joint.columns.items():
+            moment, half, colour = moments[:, k], 2.0 * sd[:, k], styles[side].colour
+            draw_sourced(axes, estimate.time, moment, source[:, k], color=colour, linewidth=1.2)
+            axes.fill_between(estimate.time, moment - half, moment + half, color=colour, alpha=0.18, linewidth=0)
+        axes.set_title(joint.name if joint.rotation else f"{joint.name}, N")
+        axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
+    figure.supxlabel("time, s", fontsize=8, color=QUIET)
+    figure.supylabel("moment, N m", fontsize=8, color=QUIET)
+    shown = [k for joint in joints for k in joint.columns.values()]
+    _key(figure, every[0], [*_side_styles(estimate, joints), *source_key(source[:, shown])], band=QUIET, columns=6)
+    return figure
+
+
+def _grid(panels: int, height: float) -> tuple[Figure, np.ndarray]:
+    """A page's width of so many panels, rows of so many inches; what is left over in the last row is empty."""
+    columns = min(4, panels)
+    rows = -(-panels // columns)
+    figure = Figure(figsize=(7.2, 0.5 + height * rows), layout="constrained")
+    every = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axes in every[panels:]:
+        axes.set_visible(False)
+    return figure, every
+
+
+def _side_styles(estimate: Estimate, joints: Sequence[Joint]) -> list[LineStyle]:
+    """The sides that these joints have, as a key names them."""
+    styles = side_lines(estimate)
+    sides = dict.fromkeys(side for joint in joints for side in joint.columns)
+    return [replace(styles[side], label=styles[side].label or "middle", width=1.4) for side in sides]
 
 
 def wrench_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -> Figure | None:

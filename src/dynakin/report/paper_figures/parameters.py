@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from dynakin.report.body import colours_of
+from dynakin.report.figure import Figure
 from dynakin.report.labels import signed_percent
 from dynakin.report.styles import LIMIT, QUIET, thin
 from dynakin.results.estimate import Estimate

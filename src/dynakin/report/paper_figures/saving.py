@@ -11,11 +11,10 @@ from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 from dynakin.files import whole_file
 from dynakin.progress import stage
-from dynakin.report.figure import FILE_STYLE
+from dynakin.report.figure import FILE_STYLE, Figure
 
 FORMATS = ("svg", "pdf", "png")
 _DPI = 300

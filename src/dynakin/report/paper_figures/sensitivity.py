@@ -15,10 +15,10 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import LogNorm, Normalize
-from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dynakin.errors import ConfigError
+from dynakin.report.figure import Figure
 from dynakin.report.styles import INK, QUIET
 from dynakin.results.files.netcdf import ONE_AT_A_TIME
 from dynakin.results.naming import number
