@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -32,8 +33,8 @@ from support.made_steps import (
 )
 
 
-def live(made: Made) -> list[FootLoads]:
-    """What is said at each frame, of what was seen until then."""
+def live(made: Made, assigned: Mapping[str, str] | None = None, said: list[str] | None = None) -> list[FootLoads]:
+    """What is known at each frame, of what was seen until then; ``said`` takes the sentences."""
     recording = made.recording
     segments = {name: f"foot_{side}" for side, names in FOOT_MARKERS.items() for name in names}
     spec = SimpleNamespace(markers=[SimpleNamespace(segment=segments.get(n, "body")) for n in recording.marker_names])
@@ -42,13 +43,16 @@ def live(made: Made) -> list[FootLoads]:
     ]
     feet_of = {side: f"foot_{side}" for side in FOOT_MARKERS}
     initial: Any = SimpleNamespace(feet=feet_of, contacts={}, spec=spec, tree=Tree.of(spec.segments), ground=LABORATORY)
-    feet = LiveFeet(initial, presets.default(), tuple(plate.name for plate in recording.plates), {})
+    feet = LiveFeet(initial, presets.default(), tuple(plate.name for plate in recording.plates), assigned or {})
     velocity = np.gradient(recording.markers, recording.time, axis=0)
     assert marker_velocities(recording).shape == velocity.shape
     plates = np.stack([np.hstack([p.force, p.moment]) for p in recording.plates], axis=1)
-    return [
+    loads = [
         feet.loads(time, recording.markers[t], velocity[t], plates[t]) for t, time in enumerate(recording.time.tolist())
     ]
+    if said is not None:
+        said += feet.news()
+    return loads
 
 
 def both(made: Made) -> tuple[np.ndarray, np.ndarray, np.ndarray, FootLoads]:
@@ -133,6 +137,29 @@ def test_a_plate_that_is_off_its_place_stays_the_foots_that_leaves_it_live() -> 
     plates = [MadePlate(f"p{k}", (0.6 * k - 0.25, 0.6 * k + 0.25), moved=(0.08, 0.0)) for k in range(4)]
     now = live(steps(lasting(4, stance_s=0.8), walk(4, 0.6, stance_s=0.8), plates))
     assert not (np.concatenate([one.reason for one in now]) == SHARED).any()
+
+
+@pytest.mark.parametrize("step_m", [0.0, 0.5])
+def test_plates_that_are_given_to_the_other_foot_are_not_believed_live(step_m: float) -> None:
+    """Walking in place and ahead; the right keys are believed and nothing is said."""
+    feet = walk(6, step_m)
+    if step_m == 0.0:
+        feet = {side: [replace(s, plates=(side,)) for s in own] for side, own in feet.items()}
+    plates = [MadePlate(name) for name in dict.fromkeys(s.plates[0] for own in feet.values() for s in own)]
+    made = steps(lasting(6), feet, plates)
+    right = {s.plates[0]: side for side, own in feet.items() for s in own}
+    said: list[str] = []
+    believed = live(made, right, said)
+    assert not [text for text in said if text.startswith("plates:")]
+    wrong = {name: "left" if side == "right" else "right" for name, side in right.items()}
+    found = live(made, wrong, said)
+    said = [text for text in said if text.startswith("plates:")]
+    assert len(said) == len(plates)
+    assert said[0].startswith(f'plates: "{plates[0].name}" is given to "left", but the left foot is 0.')
+    assert "and the right foot stands there" in said[0] and "before, moments were wrong" in said[0]
+    if step_m == 0.0:  # the same plates are pressed again
+        for frame in np.flatnonzero(made.recording.time > 1.5):
+            np.testing.assert_array_equal(found[frame].on, believed[frame].on)
 
 
 def test_stance_rises_and_falls_live() -> None:

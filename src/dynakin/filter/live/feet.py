@@ -24,6 +24,7 @@ from dynakin.recordings.feet.contact import (
 )
 from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
+from dynakin.recordings.feet.misgiven import others_plate
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.plates.ground_plate import EndOfRange, GroundPlate
 from dynakin.recordings.plates.pressure import pressed_at
@@ -171,6 +172,10 @@ class LiveFeet:
         aloft = stances.moves & ~bears & (stands.sum() > stands)  # high alone may be a pedal: no later stance is known
         plates = [] if wrenches is None else self._plates(wrenches)
         off = self._owners.look(plates, stances, bears)
+        for p, (away_m, other) in self._owners.misgiven.items():
+            owner = self._assigned[self.plates[p]]
+            found = others_plate(self.plates[p], owner, f"the {owner} foot", away_m, self.feet[other])
+            self._say(f"{found} From now on it is the foot's that stands on it; before, moments were wrong.")
         on = self._owners.owners[:, : len(plates)]
         soles = self._soles(bears, time_s, places)
         seen_none = np.zeros_like(off)  # the model shows all of them
@@ -178,9 +183,9 @@ class LiveFeet:
         loads = divided(
             self.feet, plates, soles, stances.marked, on[None], off[None], seen_none[None], aloft[None], given
         )
-        for p in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
+        for both in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
             self._say(
-                f"Both feet stand on {self.plates[p]}: its wrench is divided between them by where each one's load "
+                f"Both feet stand on {self.plates[both]}: its wrench is divided between them by where each one's load "
                 "is expected."
             )
         if plates and not loads.total_known[0]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.live.stances import LiveStances
+from dynakin.filter.live.stances import DT_S, LiveStances
 from dynakin.recordings.feet.contact import ALONE_M, NEAR_M
+from dynakin.recordings.feet.findings import OFF_PLACE_M
+from dynakin.recordings.feet.misgiven import MOST, OFF_M
 from dynakin.recordings.feet.sharing import BETWEEN_M, SHORTEST_S, beside_m, lies_between, mostly
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
@@ -15,6 +17,9 @@ from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
+WRONG_S = 0.3
+"""So long must a plate's load have lain under another foot than the declared one: half a stance of a walk."""
+
 
 class PlateOwners:
     """A plate is that foot's whose markers its force acts under in most of the frames of a stance, and both feet's
@@ -22,11 +27,18 @@ class PlateOwners:
     off the plates.
 
     Args:
-        feet, plates: how many. assigned: plate -> foot, where it is known. given: plates of declared contacts.
+        feet, plates: how many. assigned: plate -> foot, where it is declared. given: plates of declared contacts.
+
+    Attributes:
+        misgiven: plate -> (how far the declared foot was, m, the foot that stood on it), of plates that cannot be the
+            declared foot's; from then on these are as those of which nothing is declared.
     """
 
     def __init__(self, feet: int, plates: int, assigned: dict[int, int], given: list[int]) -> None:
-        self._assigned, self._given = assigned, given
+        self._assigned, self._given = dict(assigned), given
+        self.misgiven: dict[int, tuple[float, int]] = {}
+        self._borne, self._elsewhere = np.zeros(plates), np.zeros((feet, plates))  # N s so far; of it under other feet
+        self._wrong_s, self._before_s = np.zeros(plates), np.nan
         self._near, self._loaded = (np.zeros((feet, plates), dtype=int) for _ in range(2))  # frames of this stance
         self._between, self._judged = np.zeros(plates, dtype=int), np.zeros(plates, dtype=int)  # frames of this press
         self._beside = np.full(plates, np.inf)  # since when it presses between two soles
@@ -70,6 +82,7 @@ class PlateOwners:
         self._shared[:, self._press_between(plates, cops, stances, bears, away)] = True
         self._shared &= bears[:, None] & np.array([plate.pressed[0] for plate in plates])
         shared = self._shared | (bears[:, None] & mostly(self._between, self._judged))
+        self._doubt_what_is_declared(plates, stances, away, loaded)
         for p, foot in self._assigned.items():
             near[:, p] = np.arange(F) == foot
         near[:, self._given] = shared[:, self._given] = False
@@ -88,6 +101,27 @@ class PlateOwners:
             elif not self._owners[:, p].any():  # a foot that sets down, before it stands
                 nearest = int(np.argmin(away[:, p]))
                 self._owners[nearest, p] = bool(near[nearest, p] and stances.low[nearest])
+
+    def _doubt_what_is_declared(
+        self, plates: list[GroundPlate], stances: LiveStances, away: Array, loaded: Flags
+    ) -> None:
+        """As `recordings.feet.misgiven`, by the load so far. Away: (F, P) m; loaded: (P,)."""
+        dt = float(np.clip(stances.time_s - self._before_s, *DT_S)) if np.isfinite(self._before_s) else 0.0
+        self._before_s = stances.time_s
+        for p, foot in list(self._assigned.items()):
+            push = float(plates[p].wrench[0, 1])
+            if push <= JUDGED_N:
+                continue
+            elsewhere = loaded & (np.arange(len(plates)) != p)  # who stands on another plate is no witness
+            there = (stances.stands | stances.low) & (away[:, p] < NEAR_M)
+            there &= ~((away < ALONE_M) & elsewhere).any(axis=1) & (away[foot, p] > OFF_M + OFF_PLACE_M)
+            self._borne[p] += push * dt
+            self._elsewhere[there, p] += push * dt
+            self._wrong_s[p] += dt * there.any()
+            other = int(np.argmax(self._elsewhere[:, p]))
+            if self._wrong_s[p] > WRONG_S and self._elsewhere[other, p] > MOST * self._borne[p]:
+                self.misgiven[p] = float(away[foot, p]), other
+                del self._assigned[p]
 
     def _majority(self) -> Flags:
         """(F, P) plates that carry a stance, as far as it has gone."""

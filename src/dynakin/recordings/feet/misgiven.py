@@ -73,12 +73,17 @@ class Misgiven:
             return Misgiven(presses, "")
         other = max(under, key=lambda name: int(np.count_nonzero(under[name] & presses)))
         what = f"the {owner} foot" if owner in contacts else owner
-        return Misgiven(
-            presses,
-            f'plates: "{plate.name}" is given to "{owner}", but {what} is {float(np.median(away[wrong])):.2f} m from '
-            f"its centre of pressure and the {other} foot stands there, for most of its load. Correct that key, or "
-            "take the plate out of it: then it is the foot's that stands on it.",
-        )
+        found = others_plate(plate.name, owner, what, float(np.median(away[wrong])), other)
+        advice = "Correct that key, or take the plate out of it: then it is the foot's that stands on it."
+        return Misgiven(presses, f"{found} {advice}")
+
+
+def others_plate(plate: str, owner: str, what: str, away_m: float, other: str) -> str:
+    """The sentence that says so, live and afterwards."""
+    return (
+        f'plates: "{plate}" is given to "{owner}", but {what} is {away_m:.2f} m from its centre of pressure and the '
+        f"{other} foot stands there, for most of its load."
+    )
 
 
 def _away(plate: GroundPlate, owner: str, place: Array | None, contacts: Mapping[str, FootContact]) -> Array:
