@@ -41,7 +41,7 @@ def print_summary(result: Result, folder: Path) -> None:
         console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
 
 
-NOTED = ("Uncertainty", "Adaptation")
+NOTED = ("Uncertainty",)
 """Those whose notes are said in the verdict too; where they have nothing against a run they are on the page alone."""
 
 
