@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.frames import MarkedTrial
@@ -22,7 +23,7 @@ from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
 from dynakin.recordings.frame import find_laboratory_frame
 from dynakin.recordings.read import read
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.settings.subject import Subject
 from dynakin.simulation.sensors.sizes import SensorNoise
 from support.functional_trials import STANDING, functional_trial

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import finite
+from dynakin.arrays import Array, finite
 from dynakin.bindings import _core
 from dynakin.filter.augment import initial_covariance, variance_scales
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
@@ -39,7 +39,6 @@ from dynakin.units import GRAVITY_M_S2
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 MANY_REFUSED = 0.2
 """Part of the frames: a chair that is sat on unannounced has 5 % refused, plates that were moved all from then on."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Flags, runs
 from dynakin.bindings import _core
 from dynakin.filter.sight import owners_of, root_of
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -19,7 +19,6 @@ from dynakin.results.records import REFUSED, TRACKING, Event, EventKind, Paramet
 if TYPE_CHECKING:
     import xarray as xr
 
-Flags = npt.NDArray[np.bool_]
 
 FOUND_S = 0.05
 """While a segment that comes into sight again is found, markers beside it may be refused: of an arm in a squat both at
@@ -148,9 +147,7 @@ def _coordinates_at_bounds(data: xr.Dataset, initial: CalibratedModel) -> list[E
     return events
 
 
-def _stretches(
-    time: npt.NDArray[np.float64], flags: npt.NDArray[np.bool_], kind: EventKind, subject: str, what: str
-) -> list[Event]:
+def _stretches(time: npt.NDArray[np.float64], flags: Flags, kind: EventKind, subject: str, what: str) -> list[Event]:
     events = []
     for first, end in runs(flags):
         n = end - first

@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs, widened
+from dynakin.arrays import Array, Flags, runs, widened
 from dynakin.filter.contacts import ContactLoads
 from dynakin.messages import Message, warning
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE
 from dynakin.recordings.times import span, step_of
 from dynakin.results.naming import listed
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 PUSH, LANDING = 3.5, 6.0
 """Most that a foot takes, times the weight, and within `ALOFT_S` of a flight (one that is as short as a run's does not

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import cross, wrench_about
+from dynakin.arrays import Array, cross, wrench_about
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.orientation import (
@@ -18,7 +18,7 @@ from dynakin.recordings.orientation import (
     horizontal,
     refuse_mirrored,
 )
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.vertical import against_vertical, find_vertical
 
 UPRIGHT = {

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.files import expanded, write_json
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.files.config import versions
@@ -19,8 +19,6 @@ from dynakin.results.files.markers import write_trc
 from dynakin.results.files.netcdf import ONE_AT_A_TIME
 from dynakin.results.files.storage import write_storage
 from dynakin.simulation.truth import Truth
-
-Array = NDArray[np.float64]
 
 SCHEMA_VERSION = 1
 

@@ -9,17 +9,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import rms
+from dynakin.arrays import Array, Flags, rms
 from dynakin.filter.ground.needed import SMOOTH_S, Needed, smoothed
 from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
 from dynakin.messages import Message, warning
 from dynakin.recordings.recording import Plate
 from dynakin.results.naming import listed
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 APART, SIGMAS = 0.03, 3.0
 """Part by which a plate's vertical force may differ from what the motion needs of it, beside the others', and how many

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.filter.ground.carried import (
     carried_in_hands,
     carried_in_words,
@@ -40,9 +39,6 @@ from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.pushes import LOADED_N
 from dynakin.recordings.times import spans
 from dynakin.settings.contacts import SEAT
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 
 def judged(on: OnGround) -> tuple[Ground, Array]:

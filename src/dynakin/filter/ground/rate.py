@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.filter.ground.needed import Needed
-
-Array = npt.NDArray[np.float64]
 
 SLOPE, SHORT_SLOPE, SHORT_S = (0.8, 1.25), (0.6, 1.7), 0.7
 """Vertical acceleration by the plates over that by the markers and their times, which grows with the square of the

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.geometry import Geometry
 from dynakin.filter.uncertainty.upright import thighs_of, trunks_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_names
-
-Array = npt.NDArray[np.float64]
 
 ARM = 0.05
 """Part of the mass of the person in each arm (de Leva 1996)."""

@@ -6,15 +6,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.arms import Arms
 from dynakin.filter.uncertainty.frames import Frame
 from dynakin.filter.uncertainty.geometry import Geometry, Parts
 from dynakin.model.calibration.calibrated import CalibratedModel
-
-Array = npt.NDArray[np.float64]
 
 APART = 0.5
 """Times as far as forwards and up a limb may lie off to its side, each by itself (`Sizes.limbs`)."""

@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.filter.uncertainty.frames import Frame, Frames
 from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Geometry, Parts
 from dynakin.filter.uncertainty.inertia import Inertia
@@ -32,7 +32,6 @@ from dynakin.settings.noise import Noise
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 MISFIT = 1.6
 """Times `Sizes.placed` from which a run says that a model was not scaled well: by truth 0.4 to 1.1 with the person's

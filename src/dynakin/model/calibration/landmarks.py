@@ -6,16 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.errors import ModelError
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.schema import Offset, PelvisRegression, PolarRegression, Recipe, by_sex
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.settings.subject import Sex
 
-Array = npt.NDArray[np.float64]
 Positions = dict[MarkerKey, Array]
 """Marker positions (3,) m in the ground frame, by marker and side."""
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import Hips
 from dynakin.model.calibration.frames import MarkedTrial
@@ -23,8 +24,6 @@ from dynakin.model.markers.fit import ROOT
 from dynakin.model.markers.match import MarkerKey
 from dynakin.model.schema import ModelFile
 from dynakin.results.naming import listed, words
-
-Array = npt.NDArray[np.float64]
 
 _OTHER = {"right": "left", "left": "right"}
 _FEWEST, _LEAST = 3, 2

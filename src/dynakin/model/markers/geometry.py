@@ -10,11 +10,10 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.recordings.recording import Recording
-
-Array = npt.NDArray[np.float64]
 
 _HEIGHT_M = 1.75  # where nothing shows it
 _PROPORTION_SD = 0.08  # of a distance: people are built differently

@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.model.markers.geometry import (
     Deviations,
     Expected,
@@ -22,7 +23,6 @@ from dynakin.model.markers.geometry import (
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.recordings.recording import Recording
 
-Array = npt.NDArray[np.float64]
 Order = npt.NDArray[np.intp]
 
 _GAIN, _GAIN_OF_ONE = 8.0, 5.0

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.recordings.formats.c3d_parameters import Parameters
-from dynakin.recordings.recording import Array
 
 _WORDS, _HALF = 65536.0, 32768.0
 

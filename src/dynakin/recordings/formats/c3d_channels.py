@@ -4,16 +4,12 @@ and where they rest at the end of their range, whose flat top a filter makes une
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.messages import Message, note
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.pushes import JUDGED_N
-from dynakin.recordings.recording import Array
-
-Flags = npt.NDArray[np.bool_]
 
 FLAT = 5
 """So many samples exactly at a channel's extreme, and so many times as many as it holds any other value for while it

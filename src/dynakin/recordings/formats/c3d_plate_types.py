@@ -23,10 +23,10 @@ from typing import Literal
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, warning
 from dynakin.recordings.plates.dead import LEVER_M, Channels
-from dynakin.recordings.recording import Array
 
 Signal = Literal["force", "moment", "point"]
 _WRENCH: tuple[Signal, ...] = ("force",) * 3 + ("moment",) * 3

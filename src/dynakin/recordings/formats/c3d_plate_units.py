@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.messages import Message, note, together, warning
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plate_types import TYPES, Signal
 from dynakin.recordings.pushes import JUDGED_N
-from dynakin.recordings.recording import Array
 from dynakin.units import force_factor, length_factor, moment_factor
 
 _FACTORS = {"force": force_factor, "moment": moment_factor, "point": length_factor}

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.simulation.bodies.body import Contact
 from dynakin.simulation.bodies.subject import (
     ANKLE_DIRECTION,
@@ -18,7 +18,6 @@ from dynakin.simulation.bodies.subject import (
 )
 from dynakin.simulation.mechanics import Axis, Segment
 
-Array = NDArray[np.float64]
 Direction = tuple[float, float, float]
 Joint = tuple[str, str | None, Array, str, Direction]  # segment, parent, placement in it, coordinate, direction
 

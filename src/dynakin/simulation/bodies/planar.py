@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.chain import (
     BACKWARD,
@@ -35,8 +35,6 @@ from dynakin.simulation.bodies.subject import (
     symmetric,
 )
 from dynakin.simulation.mechanics import Segment
-
-Array = NDArray[np.float64]
 
 # From L5/S1 up over the torso: squat7's hinge lies at the level of T10, two vertebrae of 25 mm above T12/L1.
 HINGE_ON_TORSO = 0.41

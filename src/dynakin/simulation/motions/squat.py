@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.posture import balance, posture_jets
 from dynakin.simulation.jets import Jet, constant, sinusoids, step
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.movement import STANDING_S, Movement, Repetition, in_order
-
-Array = NDArray[np.float64]
 
 SHORTEST_S = 5.0
 SWAYING = ("ankle", "hip", "lumbar")

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.posture import balance, posture_jets
 from dynakin.simulation.jets import Jet, constant, sinusoids, step
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.movement import STANDING_S, Movement, in_order
-
-Array = NDArray[np.float64]
 
 SHORTEST_S = 3.0
 # Root mean square of each coordinate's sway, deg: ankle and hip strategies together, the arms hanging loosely.

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.frames import MarkedTrial
@@ -23,8 +23,6 @@ from dynakin.model.schema import Frame
 from dynakin.model.schema import Segment as SegmentEntry
 from dynakin.recordings.recording import Recording
 from dynakin.validation.reference.chain import PlanarChain
-
-Array = npt.NDArray[np.float64]
 
 
 def classical_angles(chain: PlanarChain, plan: ModelPlan, landmarks: Mapping[str, Array]) -> Array:
