@@ -16,10 +16,9 @@ import numpy as np
 from dynakin.arrays import Array
 from dynakin.filter.uncertainty.frames import Frame, Frames
 from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Geometry, Parts
-from dynakin.filter.uncertainty.inertia import Inertia
 from dynakin.filter.uncertainty.joints import Joints
 from dynakin.filter.uncertainty.loads import Clock, Hands, late_by
-from dynakin.filter.uncertainty.mass_centres import MassCentres
+from dynakin.filter.uncertainty.mass_centres import Inertia, MassCentres
 from dynakin.filter.uncertainty.reported import movement_intensity, reported
 from dynakin.filter.uncertainty.sizes import KINDS, Sizes, hips_unshown, usual_sizes
 from dynakin.filter.uncertainty.skin import Skin
