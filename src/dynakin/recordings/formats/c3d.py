@@ -12,8 +12,8 @@ import numpy as np
 from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
-from dynakin.recordings.formats.c3d_analog import analog_values
 from dynakin.recordings.formats.c3d_beside import first_frame, read_analog, read_events, read_subject
+from dynakin.recordings.formats.c3d_channels import analog_values
 from dynakin.recordings.formats.c3d_checks import check_c3d_file
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plates import read_plates

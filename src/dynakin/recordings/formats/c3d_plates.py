@@ -19,10 +19,13 @@ from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, together, warning
 from dynakin.recordings.formats.c3d_channels import at_end_of_range, zero_frames, zeroed
 from dynakin.recordings.formats.c3d_parameters import Parameters
-from dynakin.recordings.formats.c3d_plate_types import TYPES, as_recorded, checked_origin, plate_wrench
-from dynakin.recordings.formats.c3d_plate_units import (
+from dynakin.recordings.formats.c3d_plate_types import (
+    TYPES,
     Strange,
+    as_recorded,
+    checked_origin,
     fitting_moments,
+    plate_wrench,
     strange_in_words,
     units_of,
     volts,
