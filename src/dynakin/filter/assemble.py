@@ -12,9 +12,8 @@ from dynakin.arrays import Array, finite
 from dynakin.bindings import _core
 from dynakin.filter.augment import initial_covariance, variance_scales
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
-from dynakin.filter.events import events_of
+from dynakin.filter.events import events_of, impossible, impossible_in_words
 from dynakin.filter.ground.carried import says_carried
-from dynakin.filter.impossible import impossible, impossible_in_words
 from dynakin.filter.labels import labels
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.noise import limit_sd, prior_factor
