@@ -22,12 +22,11 @@ from dynakin.filter.ground.declared import (
     low_beside_feet,
     taken_in_words,
 )
-from dynakin.filter.ground.gain import found_gains
+from dynakin.filter.ground.gain import fitting_rate, found_gains, wrong_rate_in_words
 from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.on_ground import OnGround
 from dynakin.filter.ground.plate_errors import NO_ERRORS, VERTICAL_ONLY, PlateErrors
 from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
-from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
 from dynakin.filter.ground.shear import found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
 from dynakin.recordings.checks import PlateCheck
