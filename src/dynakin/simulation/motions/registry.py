@@ -19,10 +19,9 @@ from dynakin.simulation.motions.motion_file import file_movement
 from dynakin.simulation.motions.movement import Movement
 from dynakin.simulation.motions.sit_in_space import sit_in_space
 from dynakin.simulation.motions.sit_to_stand import sit_to_stand_movement
-from dynakin.simulation.motions.squat import squat_movement
+from dynakin.simulation.motions.squat import squat_movement, sway_movement
 from dynakin.simulation.motions.squat_in_space import squat_in_space
 from dynakin.simulation.motions.steps import steps_down, steps_up
-from dynakin.simulation.motions.sway import sway_movement
 
 MOTIONS: dict[str, Callable[[np.random.Generator, SimulatedBody, float], Movement]] = {
     "squat": squat_movement,
