@@ -12,7 +12,8 @@ from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.completion import Proportions
 from dynakin.model.calibration.frames import MarkedTrial
-from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
+from dynakin.model.calibration.landmarks import LandmarkFinder
+from dynakin.model.mirroring import SIDES
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.loads import FootLoads

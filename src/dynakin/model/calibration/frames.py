@@ -11,8 +11,9 @@ import numpy.typing as npt
 from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note
-from dynakin.model.calibration.landmarks import SIDES, Positions
+from dynakin.model.calibration.landmarks import Positions
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
+from dynakin.model.mirroring import SIDES
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
