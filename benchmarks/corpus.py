@@ -25,8 +25,9 @@ from pages import put
 
 from dynakin.errors import DynakinError
 from dynakin.messages import about, from_attributes, warnings_of
+from dynakin.model.calibration.how import Calibration
 from dynakin.recordings.companions import STANDING_WORDS, companion_forces, companion_static
-from dynakin.recordings.frame import find_laboratory_frame
+from dynakin.recordings.landmarks import DEFAULT_PAIRS
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.studies.engine.build import build
@@ -153,7 +154,8 @@ def compared(rows: list[Row]) -> Iterator[str]:
             data = opened.load()
         mass_kg = _their_mass(row) or config["mass_kg"]
         for theirs in _references(row, mass_kg):
-            ground = find_laboratory_frame(row.recording, vertical=config["ground"]["vertical"], forward="auto")
+            how = Calibration(vertical=config["ground"]["vertical"])
+            ground = how.find_ground(row.recording, DEFAULT_PAIRS, None, floating=True)
             found = differences(data, ground, mass_kg, theirs)
             for joint in dict.fromkeys(joint for _, joint in found):
                 yield f"| `{row.name}` | {row.given or '–'} | {theirs.what} | {' | '.join(_cells(found, joint))} |"

@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 from pages import put
 
+from dynakin.arrays import Flags
 from dynakin.errors import DynakinError
-from dynakin.filter.adapt import Flags, calibrated_noise, nis_per_row
+from dynakin.filter.adapt import calibrated_noise, nis_per_row
 from dynakin.filter.alignment import run_in_step
 from dynakin.filter.tracker import Tracker
 from dynakin.settings.noise import JointGroup

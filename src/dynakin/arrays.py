@@ -1,5 +1,6 @@
-"""What all share of arrays: runs of true values, peaks, angles within a turn, vectors' products, wrenches about another
-point, means of what is known, samples by their neighbours; no gaps, and no infinities, which no file may have."""
+"""What all share of arrays: their types, runs of true values, peaks, angles within a turn, vectors' products, wrenches
+about another point, means of what is known, samples by their neighbours; no gaps, and no infinities, which no file may
+have."""
 
 from __future__ import annotations
 
@@ -8,14 +9,18 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+Codes = npt.NDArray[np.uint8]
 
-def runs(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+
+def runs(flags: Flags) -> list[tuple[int, int]]:
     """Frames [first, end) of each stretch of true in ``flags`` (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
 
 
-def widened(flags: npt.NDArray[np.bool_], frames: int) -> npt.NDArray[np.bool_]:
+def widened(flags: Flags, frames: int) -> Flags:
     """``flags`` (T,) with so many frames more on either side of each stretch of true."""
     wide = flags.copy()
     for first, end in runs(flags):
@@ -23,7 +28,7 @@ def widened(flags: npt.NDArray[np.bool_], frames: int) -> npt.NDArray[np.bool_]:
     return wide
 
 
-def peaks(path: npt.NDArray[np.float64], prominence: float) -> list[int]:
+def peaks(path: Array, prominence: float) -> list[int]:
     """Where ``path`` (T,) is higher than on both sides, the middle of a flat top, and at least by ``prominence`` higher
     than the higher of the two lowest points on the way to something higher, or to an end, on either side.
 
@@ -42,7 +47,7 @@ def peaks(path: npt.NDArray[np.float64], prominence: float) -> list[int]:
     return found
 
 
-def wrapped(angles: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def wrapped(angles: npt.ArrayLike) -> Array:
     """Angles (rad) within half a turn of zero."""
     return np.asarray((np.asarray(angles) + np.pi) % (2.0 * np.pi) - np.pi)
 
@@ -50,55 +55,55 @@ def wrapped(angles: npt.ArrayLike) -> npt.NDArray[np.float64]:
 _NEXT = np.array([1, 2, 0])
 
 
-def cross(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def cross(a: Array, b: Array) -> Array:
     """Vector products along the last axis, bit for bit those of `np.cross`, which takes ten times as long for the few
     hundred vectors of a movement."""
     turned = a * b.take(_NEXT, -1) - a.take(_NEXT, -1) * b
     return np.asarray(turned.take(_NEXT, -1))
 
 
-def by_neighbours(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def by_neighbours(values: Array) -> Array:
     """(T - 4, ...) what each sample but two on either side of (T, ...) would be by the cubic through the two before it
     and the two behind it; NaN where one of these is missing."""
     return np.asarray((4.0 * (values[1:-3] + values[3:-1]) - values[:-4] - values[4:]) / 6.0)
 
 
-def filled(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def filled(values: Array) -> Array:
     """The same numbers with 0 where one is missing (NaN): `np.nan_to_num` takes ten times as long for a frame."""
     return np.where(np.isnan(values), 0.0, values)
 
 
-def wrench_about(wrench: npt.NDArray[np.float64], point: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def wrench_about(wrench: Array, point: Array) -> Array:
     """Wrenches (..., 6) about the origin, their moments about ``point`` (..., 3) instead: m_r = m_O - r x f."""
     force = wrench[..., :3]
     return np.concatenate([force, wrench[..., 3:] - cross(point, force)], axis=-1)
 
 
-def rms(values: npt.ArrayLike, axis: int | None = None) -> npt.NDArray[np.float64]:
+def rms(values: npt.ArrayLike, axis: int | None = None) -> Array:
     """Root mean square of the numbers that are known, along an axis or of all; NaN where none is."""
     return _root_mean(np.asarray(values) ** 2, axis)
 
 
-def rms_length(vectors: npt.NDArray[np.float64], axis: int | None = None) -> npt.NDArray[np.float64]:
+def rms_length(vectors: Array, axis: int | None = None) -> Array:
     """Root mean square length of vectors (..., n), along an axis or of all; one with an unknown component does not
     count. NaN without any."""
     return _root_mean((vectors**2).sum(axis=-1), axis)
 
 
-def _root_mean(squares: npt.NDArray[np.float64], axis: int | None) -> npt.NDArray[np.float64]:
+def _root_mean(squares: Array, axis: int | None) -> Array:
     known = ~np.isnan(squares)  # an infinity is no gap
     with np.errstate(invalid="ignore"):
         return np.asarray(np.sqrt(np.where(known, squares, 0.0).sum(axis=axis) / known.sum(axis=axis)))
 
 
-def mean_seen(points: npt.NDArray[np.float64], axis: int) -> npt.NDArray[np.float64]:
+def mean_seen(points: Array, axis: int) -> Array:
     """Mean along an axis of the points (..., n) that are seen whole; NaN where none is."""
     seen = np.isfinite(points).all(axis=-1, keepdims=True)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(seen, points, 0.0).sum(axis=axis) / seen.sum(axis=axis))
 
 
-def finite(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def finite(values: npt.ArrayLike) -> Array:
     """The same numbers with infinities as NaN."""
     found = np.asarray(values, dtype=float)
     return np.where(np.isinf(found), np.nan, found) if np.isinf(found).any() else found

@@ -19,10 +19,10 @@ from dynakin.arrays import runs
 from dynakin.bindings import _core
 from dynakin.cli.prepared import assumed
 from dynakin.errors import RecordingError
+from dynakin.filter.events import impossible
 from dynakin.filter.ground.closure import closure
 from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.needed import Needed
-from dynakin.filter.impossible import impossible
 from dynakin.filter.sight import LiveSight
 from dynakin.filter.sources import ContactSources, with_sources
 from dynakin.recordings.feet.assignment import foot_loads

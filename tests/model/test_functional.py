@@ -11,18 +11,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.frames import MarkedTrial
 from dynakin.model.calibration.functional import functional_landmarks
+from dynakin.model.calibration.how import AUTO
 from dynakin.model.calibration.joint_motion import JointMotion, angle_deg, joint_axis, joint_centre, rigid_motion
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
-from dynakin.recordings.frame import find_laboratory_frame
 from dynakin.recordings.read import read
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.settings.subject import Subject
 from dynakin.simulation.sensors.sizes import SensorNoise
 from support.functional_trials import STANDING, functional_trial
@@ -87,7 +88,7 @@ def test_a_regression_that_is_off_is_replaced() -> None:
     for seed in SEEDS[:4]:
         hip, centre, _ = functional_trial(seed, "hip", noise)
         match = match_markers(load_marker_set("opencap"), hip.marker_names, [True] * len(hip.marker_names), hip.name)
-        ground = find_laboratory_frame(hip, vertical="auto", forward="auto", pairs=match.facing_pairs)
+        ground = AUTO.find_ground(hip, match.facing_pairs, None, floating=True)
         trial = MarkedTrial.of(hip, match, ground).facing()
         finder = LandmarkFinder(match, "both", "male", planar=False, in_space=True, height_m=1.75)
         before = finder.find_in_space(trial.median(STANDING))

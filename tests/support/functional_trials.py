@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynakin.recordings.recording import Array, Recording
+from dynakin.arrays import Array
+from dynakin.recordings.recording import Recording
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.registry import choose_body
 from dynakin.simulation.bodies.subject import Spread

@@ -9,8 +9,9 @@ from functools import cache
 import numpy as np
 
 from dynakin import Estimator, Subject, load_model
+from dynakin.arrays import Array
 from dynakin.filter.prepared import Prepared
-from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.trial import simulate
 
 LENGTH_S = {"gait": 4.0, "squat": 8.0}

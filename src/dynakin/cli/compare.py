@@ -59,12 +59,13 @@ def compare(
             settings_of,
         )
         from dynakin.report.comparison_page import render_comparison
-        from dynakin.validation.files import check_comparison_folder, save_comparison
+        from dynakin.results.files.folder import check_output_writable
+        from dynakin.validation.files import COMPARISON, save_comparison
         from dynakin.validation.methods import ComparedTrial
         from dynakin.validation.unseen import check_horizon
 
     if output is not None:
-        check_comparison_folder(output)
+        check_output_writable(output, kind=COMPARISON)
     chosen = chosen_trials(trials or [], identify_trial, test_trial, halved or not_seen)
     with stage("reading the recordings"):
         cases = cases_of(chosen, forces or [], preset or [], cutoff, given)

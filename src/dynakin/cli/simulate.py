@@ -54,12 +54,13 @@ def simulate(
     rail: Annotated[float, typer.Option(help="Push of fullbody's hands on a rail, of body weight, to 0.3.")] = 0.0,
 ) -> None:
     """Simulate a trial whose truth is known, and write recording and truth."""
+    from dynakin.results.files.folder import check_output_writable
     from dynakin.simulation.bodies.subject import Spread
-    from dynakin.simulation.output import check_trial_folder
+    from dynakin.simulation.output import TRIAL
     from dynakin.simulation.sensors.sizes import load_sensors
     from dynakin.simulation.trial import simulate as simulate_trial
 
-    check_trial_folder(output)
+    check_output_writable(output, kind=TRIAL)
     noise = load_sensors(sensors).changed(_pairs(sensor or []))
     with stage("simulating"):
         trial = simulate_trial(

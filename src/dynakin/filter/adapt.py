@@ -11,8 +11,8 @@ average out, and data that count for more would only bend them further.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.errors import DivergenceError
 from dynakin.filter.augment import continuous_noise
 from dynakin.filter.measurements import Measurements
@@ -22,9 +22,6 @@ from dynakin.progress import Progress
 from dynakin.results.measures.tracking import ANY_ASTRAY
 from dynakin.results.records import FOLLOWING, REFUSED
 from dynakin.settings.noise import JointGroup, Noise
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 CALIBRATED_S = 4.0
 """How long somebody is followed of what is filtered again with other jerk densities, from the recording's start: 3 and

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from dynakin.arrays import Array
 from dynakin.filter.ground.closure import plates_misfit
 from dynakin.filter.ground.delay import Delay, clock_in_words
 from dynakin.filter.ground.needed import Needed
@@ -17,8 +15,6 @@ from dynakin.messages import Message, note
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.results.naming import sentence
-
-Array = npt.NDArray[np.float64]
 
 LEAST_S = 0.003
 """A lesser delay is left to the state: a third of a frame at 100 Hz moves no moment by much."""

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import finite
+from dynakin.arrays import Array, finite
 from dynakin.bindings import _core
 from dynakin.filter.augment import initial_covariance, variance_scales
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
-from dynakin.filter.events import events_of
+from dynakin.filter.events import events_of, impossible, impossible_in_words
 from dynakin.filter.ground.carried import says_carried
-from dynakin.filter.impossible import impossible, impossible_in_words
 from dynakin.filter.labels import labels
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.noise import limit_sd, prior_factor
@@ -39,7 +38,6 @@ from dynakin.units import GRAVITY_M_S2
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 MANY_REFUSED = 0.2
 """Part of the frames: a chair that is sat on unannounced has 5 % refused, plates that were moved all from then on."""

@@ -7,9 +7,8 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import rms
+from dynakin.arrays import Array, rms
 from dynakin.bindings import _core
 from dynakin.filter.noise import (
     BEGUN_SD,
@@ -24,8 +23,6 @@ from dynakin.model.schema import kinds_of
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.units import COMPONENTS
-
-Array = npt.NDArray[np.float64]
 
 CONTACT_TIME_S = 0.3
 """How long what is not known of a contact's wrench lasts: half a step."""

@@ -8,15 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array, Codes, Flags
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.samples import in_step
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.times import step_of
-
-Array = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.uint8]
-Flags = npt.NDArray[np.bool_]
 
 RESIDUAL = "residual"
 """Name of the contact that is none: what the model does not explain, on the root (docs/design.md)."""
@@ -214,6 +211,6 @@ def _joint(each: Array) -> Array:
     return joint.reshape(frames, 6 * count, 6 * count)
 
 
-def stands_off_plates(contact: npt.NDArray[np.uint8], feet: int) -> bool:
+def stands_off_plates(contact: Codes, feet: int) -> bool:
     """Whether some foot stands off the plates, by contacts (T, F) of which the first are feet."""
     return bool((contact[:, :feet] == UNMEASURED).any())

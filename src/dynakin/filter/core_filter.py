@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError
 from dynakin.filter.augment import continuous_noise, extended, initial_covariance
@@ -22,8 +22,6 @@ from dynakin.filter.noise import (
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
-
-Array = npt.NDArray[np.float64]
 
 
 def core_filter(

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.assemble import assemble
@@ -44,7 +44,6 @@ from dynakin.settings.noise import Noise
 from dynakin.settings.strict import nearest
 from dynakin.settings.subject import CarriedLoad
 
-Array = npt.NDArray[np.float64]
 Feet = Callable[[CalibratedModel], ContactLoads | None]
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.noise import soft_tissue_time_s
 from dynakin.filter.tracker import Tracker
@@ -23,8 +24,6 @@ from dynakin.model.spec import free_coordinates
 from dynakin.recordings.times import step_of
 from dynakin.results.records import FOLLOWING
 from dynakin.settings.noise import Noise
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

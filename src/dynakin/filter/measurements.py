@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from dynakin.arrays import Array
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.samples import in_step
-
-Array = npt.NDArray[np.float64]
 
 
 class Measurements(NamedTuple):

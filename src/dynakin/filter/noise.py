@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import chdtri
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import JointGroup, Noise
-
-Array = npt.NDArray[np.float64]
 
 MOVED_S = 0.1
 """Over which the way of markers says how much somebody moves, where noise is found in innovations."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.elements import element
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
 from dynakin.results.records import Parameter, ParameterKind
-
-Array = npt.NDArray[np.float64]
 
 _KINDS: dict[str, ParameterKind] = {"length": "length", "marker": "marker", "inertia": "inertia", "plates": "plates"}
 _INERTIA_UNITS = {"mass": "kg", "mx": "kg m", "my": "kg m", "mz": "kg m"}

@@ -6,9 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from dynakin.arrays import Array
 from dynakin.filter.adapt import CALIBRATED_S, calibrated_noise, frames_that_show
 from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.following_skin import following_skin, may_follow
@@ -18,8 +16,6 @@ from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note
 from dynakin.progress import Progress
 from dynakin.settings.lag import frames_later
-
-Array = npt.NDArray[np.float64]
 
 
 class Passed(NamedTuple):

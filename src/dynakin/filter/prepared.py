@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Flags
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.ground import Ground
@@ -20,9 +20,6 @@ from dynakin.messages import Message
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, source_figures
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

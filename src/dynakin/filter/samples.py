@@ -9,13 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.limits import FARTHEST_M, LARGEST_MOMENT_NM
 from dynakin.recordings.recording import Recording
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,13 @@ from __future__ import annotations
 from itertools import takewhile
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.upright import floats
 from dynakin.results.measures.sources import LEAST_OF_ROOT, Hidden, in_use, out_of_sight, taken_back, too_long
 from dynakin.results.records import REFUSED
 from dynakin.tree import Tree
-
-Flags = npt.NDArray[np.bool_]
-Array = npt.NDArray[np.float64]
 
 SKIN_M, SHOWN_RAD = 0.01, np.deg2rad(10.0)
 """A segment out of sight is known where markers that skin moves by so much show its joint to so much. Of a person of

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Codes, Flags
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.sight import owners_of
@@ -28,9 +28,6 @@ from dynakin.tree import Tree
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Flags = npt.NDArray[np.bool_]
-Codes = npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
+from dynakin.arrays import Array, Codes
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.spec import free_coordinates
@@ -17,8 +17,6 @@ from dynakin.results.measures.sources import ABSENT
 from dynakin.settings.strict import nearest
 from dynakin.units import COMPONENTS
 
-Array = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.uint8]
 Places = Mapping[str, int]
 
 _WRENCH: Places = {name: k for k, name in enumerate(COMPONENTS)}

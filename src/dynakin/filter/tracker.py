@@ -7,8 +7,8 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.contacts import ContactLoads, stands_off_plates
@@ -30,8 +30,6 @@ from dynakin.results.records import NO_ESTIMATE
 from dynakin.settings.lag import check_can_smooth
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
-
-Array = npt.NDArray[np.float64]
 
 
 class Tracker:

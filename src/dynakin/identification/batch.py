@@ -16,13 +16,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
-from dynakin.arrays import rms, wrench_about
+from dynakin.arrays import Array, rms, wrench_about
 from dynakin.errors import RecordingError
 from dynakin.identification.trials import SHORTEST_S, Common, MeasuredTrial
 from dynakin.identification.unknowns import Unknowns
 from dynakin.recordings.times import step_of
-
-Array = npt.NDArray[np.float64]
 
 PASSES = 4  # linearised anew, and weights measured anew, at each
 FIRST_SIGMA = np.array([10.0, 20.0, 10.0, 10.0, 10.0, 10.0])

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import rms, wrench_about
+from dynakin.arrays import Array, rms, wrench_about
 from dynakin.errors import RecordingError
 from dynakin.identification.batch import Posterior, at_start, identify_batch, known_s
 from dynakin.identification.trials import SHORTEST_S, Common, MeasuredTrial, middle_of
@@ -22,7 +21,6 @@ from dynakin.identification.unknowns import Unknowns
 from dynakin.progress import Progress
 from dynakin.units import COMPONENTS
 
-Array = npt.NDArray[np.float64]
 Use = Literal["table", "bodies"]
 USES: tuple[Use, ...] = get_args(Use)
 

@@ -23,13 +23,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.filter.uncertainty.upright import trunks_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
 from dynakin.settings.model import Priors
-
-Array = npt.NDArray[np.float64]
 
 _PLANAR = ("mass", "mx", "my", "izz")
 PARTS = ("a", "cx", "cy", "cz", "d1", "d2", "d3", "s12", "s13", "s23")

@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.identification.batch import Posterior
 from dynakin.identification.decision import Decision
@@ -15,8 +15,6 @@ from dynakin.identification.observability.structure import base_spread
 from dynakin.model.identified import Batch, IdentifiedSubject
 from dynakin.results.measures.posterior import judged
 from dynakin.results.naming import listed, number, words
-
-Array = npt.NDArray[np.float64]
 
 _CENTRE_M = 0.005  # of a centre of mass, from which on it is said to have moved
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.blas import one_blas_thread
 from dynakin.errors import DynakinError, LostError
 from dynakin.filter.estimator import Estimator
@@ -26,8 +26,6 @@ from dynakin.recordings.recording import Recording
 from dynakin.settings import presets
 from dynakin.settings.lag import can_smooth
 from dynakin.validation.held_out import IdentifyingTrial
-
-Array = npt.NDArray[np.float64]
 
 _WORK, _SEEING = 1000, 850  # of a progress bar: nearly all of the time goes into the kinematics
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import filled
+from dynakin.arrays import Array, filled
 from dynakin.bindings import _core
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
@@ -31,8 +31,6 @@ from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.freeze import freeze, initial_values
 from dynakin.validation.held_out import as_estimate, measured_wrench, start_as
-
-Array = npt.NDArray[np.float64]
 
 RATE_HZ = 25.0
 """Frames a second that are kept: the model's error is alike for 0.15 to 0.3 s, so more say nothing new."""

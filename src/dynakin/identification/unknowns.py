@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.identification.inertial_parameters import InertialParameters
 from dynakin.identification.trials import Common
-
-Array = npt.NDArray[np.float64]
 
 SCALED_M = 0.4  # of a segment that a dimensionless factor of an OpenSim model scales
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from dynakin.arrays import Array
 
 INERTIA_NAMES = ("mass", "mx", "my", "mz", "ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 PLANAR_INERTIA = frozenset({"mass", "mx", "my", "izz"})

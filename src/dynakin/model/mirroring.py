@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
+SIDES = ("right", "left")
+OTHER_SIDE = {"right": "left", "left": "right"}
 SUFFIXES = {"right": "_r", "left": "_l"}
 
 

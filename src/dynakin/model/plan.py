@@ -6,15 +6,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import block_diag
 
+from dynakin.arrays import Array
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
 from dynakin.model.schema import Interval, ModelFile, Segment, kinds_of
 from dynakin.model.state_priors import JointPrior, inertia_covariance, places_prior, state_bounds, state_prior
 from dynakin.settings.model import Bounds, Priors
-
-Array = npt.NDArray[np.float64]
 
 SUPPOSED_AXIS = 2.0
 """Times as far off as between two epicondyles is a knee's axis that one marker alone does not show: laid between the

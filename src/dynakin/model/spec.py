@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.model.plan import ModelPlan
 from dynakin.model.schema import Segment
-
-Array = npt.NDArray[np.float64]
 
 
 def to_core(plan: ModelPlan) -> _core.ModelSpec:

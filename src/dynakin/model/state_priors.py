@@ -6,14 +6,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import block_diag
 
+from dynakin.arrays import Array
 from dynakin.model.inertia import INERTIA_NAMES, RigidBody
 from dynakin.model.schema import Interval
 from dynakin.settings.model import Bounds, Priors
-
-Array = npt.NDArray[np.float64]
 
 _SDS = 4.0
 """Half width of the bounds of what has a standard deviation of its own: the +-20 % of a length are as much of its."""

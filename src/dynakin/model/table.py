@@ -18,15 +18,14 @@ from importlib import resources
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.files import LARGEST_TEXT, is_file, read_bytes
 from dynakin.model.inertia import RigidBody
 from dynakin.settings.strict import nearest
 from dynakin.settings.subject import Sex
 
-Array = npt.NDArray[np.float64]
 BUILTIN = ("dumas", "deleva")
 PAIRED = frozenset({"upper_arm", "forearm", "hand", "thigh", "shank", "foot"})
 """Parts of which the body has two."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dynakin.errors import ConfigError, OutputError
-from dynakin.files import expanded
+from dynakin.files import expanded, write_json
 from dynakin.identification.observability.trial import Identifiability
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import stage
@@ -18,7 +18,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.failures import LOG, Failures
 from dynakin.results.files import body as body_files
 from dynakin.results.files import motion as motion_files
-from dynakin.results.files.config import write_config, write_metrics, write_parameters
+from dynakin.results.files.config import write_config, write_parameters
 from dynakin.results.files.folder import replacing
 from dynakin.results.files.markers import write_markers
 from dynakin.results.files.netcdf import write_netcdf
@@ -239,7 +239,7 @@ class Result:
                 failed,
                 lambda path: self._write_page(whole, metrics, path),
             )
-            write_metrics(self.metrics(), made / "metrics.json")
+            write_json(made / "metrics.json", self.metrics())
             if failed.found:
                 (made / LOG).write_text(failed.log(), encoding="utf-8", newline="\n")
 

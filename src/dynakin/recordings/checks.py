@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.messages import Findings, Message, note, warning
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import COP_REFUSED_M, NEAR_M
@@ -20,7 +21,7 @@ from dynakin.recordings.orientation import nearest_axis
 from dynakin.recordings.plates.ground_plate import SHOE_M
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.pushes import BEARS_N, JUDGED_N, UNLOADED_N
-from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.recordings.weight import TILT_WARNING_DEG, check_steps, check_weight, likely_unit, while_loaded
 

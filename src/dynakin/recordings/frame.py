@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import cross, wrench_about
+from dynakin.arrays import Array, cross, wrench_about
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.orientation import (
@@ -18,7 +18,7 @@ from dynakin.recordings.orientation import (
     horizontal,
     refuse_mirrored,
 )
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.vertical import against_vertical, find_vertical
 
 UPRIGHT = {
@@ -165,21 +165,3 @@ def find_ground_frame(
         how.append(f"Forward ({', '.join(f'{value:.3f}' for value in ahead + 0.0)}) in the laboratory: given.")
     rotation = np.vstack([ahead, up, np.cross(ahead, up)])
     return GroundFrame(rotation, np.zeros(3), axis, ahead, tuple(how))
-
-
-def find_laboratory_frame(
-    recording: Recording,
-    *,
-    vertical: str = "auto",
-    forward: str | Sequence[float] | Array = "auto",
-    pairs: FacingPairs = DEFAULT_PAIRS,
-    static: Recording | None = None,
-) -> GroundFrame:
-    """The ground frame of a model that is fixed nowhere: the laboratory's own, Y up, about its origin.
-
-    Such a model may head anywhere, so that nothing has to be turned back. With ``forward`` given X is forward, as in
-    `find_ground_frame`, whose arguments and errors these are.
-    """
-    found = find_ground_frame(recording, vertical=vertical, forward=forward, pairs=pairs, static=static)
-    asked = not isinstance(forward, str) or forward.casefold() != "auto"
-    return found if asked else found.upright()

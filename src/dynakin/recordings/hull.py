@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from dynakin.recordings.recording import Array
+from dynakin.arrays import Array
 
 _FRAMES = 4096  # at once: all pairs of corners of an hour take much memory
 

@@ -7,7 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from dynakin.recordings.recording import Array, Recording
+from dynakin.arrays import Array
+from dynakin.recordings.recording import Recording
 
 
 @dataclass(frozen=True)

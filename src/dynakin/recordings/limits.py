@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.recordings.pushes import LOADED_N
 from dynakin.recordings.times import step_of
-
-Array = npt.NDArray[np.float64]
 
 SLOWEST_HZ, FASTEST_HZ = 5.0, 1e5
 """Rates of markers and plates. A movement cannot be followed from a sample every 0.2 s; times in milliseconds are the

@@ -11,13 +11,10 @@ from functools import cached_property
 from itertools import pairwise, product
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, runs
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.times import frame_numbers, on_grid
-
-Array = npt.NDArray[np.float64]
 
 QUIET_M = 5e-6
 """Noise a frame near half the rate, median over the markers, below which no camera measured it: raw recordings have

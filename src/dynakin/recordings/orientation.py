@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dynakin.arrays import mean_seen
+from dynakin.arrays import Array, mean_seen
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.landmarks import FacingPairs, mean_position, plain_name, present_pairs
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
 
 FACING_WINDOW_S = 1.0

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import wrench_about
+from dynakin.arrays import Array, wrench_about
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
 from dynakin.recordings.limits import check_markers, check_place, check_wrench, numbers
@@ -54,7 +54,7 @@ class AnalogChannel:
     values: npt.NDArray[np.float32]
 
     @property
-    def time(self) -> npt.NDArray[np.float64]:
+    def time(self) -> Array:
         """(N,) s."""
         return np.asarray(self.start_s + np.arange(len(self.values)) / self.rate_hz)
 
@@ -67,8 +67,6 @@ class AnalogChannel:
         )
         return replace(self, start_s=self.start_s + first / self.rate_hz, values=self.values[first:last])
 
-
-Array = npt.NDArray[np.float64]
 
 _PERSON = 0.25  # of the markers that are usually seen: fewer are what a person leaves behind, or reflections
 

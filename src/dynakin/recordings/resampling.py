@@ -9,9 +9,8 @@ import numpy.typing as npt
 import scipy
 from scipy.linalg import blas
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, runs
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.recordings.recording import Array
 from dynakin.recordings.times import rate_of, step_of
 
 UNEVEN = 0.1

@@ -6,16 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.recordings.resampling import low_pass
 from dynakin.recordings.times import even_step
 from dynakin.settings.defaults import CUTOFF_HZ
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 MAX_GAP_S = 0.1
 """Longer gaps stay gaps: at 6 Hz a spline over more than half a period invents the movement."""
@@ -82,7 +78,7 @@ def smooth(
     return Smoothed(values, rates, seconds, tuple(notes))
 
 
-def fill_gaps(signal: Array, max_frames: int) -> tuple[Array, Mask]:
+def fill_gaps(signal: Array, max_frames: int) -> tuple[Array, Flags]:
     """The signal (T,) with inner gaps of at most ``max_frames`` filled by a cubic spline, and where (T,) it was."""
     missing = ~np.isfinite(signal)
     filled = np.zeros(len(signal), dtype=bool)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
-from dynakin.recordings.recording import Array, Recording
+from dynakin.arrays import Array, runs
+from dynakin.recordings.recording import Recording
 
 STILL_SPEED_M_S = 0.06
 """Still: the 90th percentile of the markers' speeds stays below this. Quiet standing sways with 0.01 to 0.03

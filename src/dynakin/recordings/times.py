@@ -12,11 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import by_neighbours
+from dynakin.arrays import Array, by_neighbours
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
-
-Array = npt.NDArray[np.float64]
 
 ENDS_S = 0.03
 """How near a recording's ends frames on one side alone help: how much the movement changes there is a guess."""

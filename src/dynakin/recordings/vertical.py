@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.arrays import mean_seen
+from dynakin.arrays import Array, mean_seen
 from dynakin.errors import RecordingError
 from dynakin.recordings.landmarks import FacingPairs, find_marker, mean_position, present_pairs
 from dynakin.recordings.orientation import AXES, axis_vector, nearest_axis, walks
 from dynakin.recordings.pushes import BEARS_N
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 
 _MIN_SHARE = 0.8  # how much of a direction an axis must hold to be taken for it (37 deg)
 FLOOR_M = 0.10

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.messages import Findings
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.pushes import JUDGED_N
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.units import GRAVITY_M_S2, PERSON_MASS_KG
 
 UNIT_WITHIN = 0.2

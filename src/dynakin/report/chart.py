@@ -10,11 +10,10 @@ from html import escape
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, runs
 from dynakin.report.styles import GRID, LIMIT, by_source, thin
 from dynakin.results.measures.sources import MEASURED
 
-Array = npt.NDArray[np.float64]
 Points = npt.NDArray[np.complex128]
 Place = Callable[[Array], Array]
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from markupsafe import Markup
 
+from dynakin.arrays import Array
 from dynakin.report.body import chain_of, painted
 from dynakin.report.labels import short_marker_names
 from dynakin.report.sides import Joint, joints_of, normalising_mass
@@ -25,8 +26,6 @@ from dynakin.results.measures.pressure import centre_of_pressure, floor_height, 
 from dynakin.results.measures.sources import ABSENT, DERIVED, PRIOR, moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
 
 _PICTURES_PER_SECOND = 30.0
 _MOST_BYTES = 375_000  # of base64 in the page, about: where each number takes one byte

@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import Contact, SimulatedBody
 from dynakin.simulation.mechanics import Dynamics, Motion, TreeMotion, dynamics, kinematics
 from dynakin.simulation.motions.movement import Movement, Seat
 from dynakin.simulation.support import carried_by_contacts, pressed
-
-Array = NDArray[np.float64]
 
 SIDEWAYS_SHARE = 0.06  # of the vertical force: the feet stand apart and push outward against each other
 

@@ -11,11 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynakin.arrays import cross
-
-Array = NDArray[np.float64]
+from dynakin.arrays import Array, cross
 
 GRAVITY = np.array([0.0, -9.80665, 0.0])  # m/s^2, ground frame: X forward, Y up, Z right
 

@@ -10,17 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.files import expanded, write_json
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.files.config import versions
-from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
+from dynakin.results.files.folder import FolderKind, replacing
 from dynakin.results.files.markers import write_trc
 from dynakin.results.files.netcdf import ONE_AT_A_TIME
 from dynakin.results.files.storage import write_storage
 from dynakin.simulation.truth import Truth
-
-Array = NDArray[np.float64]
 
 SCHEMA_VERSION = 1
 
@@ -57,15 +55,6 @@ def save_trial(trial: SimulatedTrial, folder: str | Path) -> Path:
             if name != "forces.mot" or trial.recording.plates:
                 write(trial, made / name)
     return folder
-
-
-def check_trial_folder(folder: str | Path) -> None:
-    """Make sure, before anything is computed, that `save_trial` may write to ``folder``.
-
-    Raises:
-        OutputError: a file is in the way, or the folder holds something that the simulator did not write.
-    """
-    check_output_writable(folder, kind=TRIAL)
 
 
 def _write_markers(trial: SimulatedTrial, path: Path) -> None:

@@ -9,10 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.errors import ConfigError
-
-Array = NDArray[np.float64]
 
 HALF_PLATE_M = (0.30, 0.20)  # half the length and width of a plate
 PRESSES_N = 5.0

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.messages import note
 from dynakin.recordings.recording import Recording
@@ -29,8 +29,6 @@ from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.streams import Streams
 from dynakin.simulation.support import PLATES, one_plate, plates_that_measure
 from dynakin.simulation.truth import Truth, all_parameters, label_arrays
-
-Array = NDArray[np.float64]
 
 GROUND_IN_LABORATORY = (-0.12, -0.60)  # x and z (m) of the ground origin; the floor is y = 0
 SYNTHETIC_S = 20.0  # duration of a motion that has no end of its own

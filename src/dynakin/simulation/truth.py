@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.markers import Site, marker_positions
 from dynakin.simulation.bodies.subject import SimulatedSubject
@@ -18,8 +18,6 @@ from dynakin.simulation.motions.movement import Repetition
 from dynakin.simulation.sensors.plates import PlateErrors
 from dynakin.simulation.sensors.sensed_markers import Fault
 from dynakin.units import COMPONENTS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import StreamError
 from dynakin.filter.samples import Sample
 from dynakin.recordings.limits import FARTHEST_M
@@ -17,8 +17,6 @@ from dynakin.stream.plate_samples import PlateSamples
 from dynakin.stream.sources.clock import Clock, offset_between
 from dynakin.stream.sources.in_order import Counts, InOrder
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
-
-Array = npt.NDArray[np.float64]
 
 SILENT_S = 0.25
 """A stream from which nothing has come for so long is silent: nobody waits for it."""

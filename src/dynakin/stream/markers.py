@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.messages import Message, warning
 from dynakin.recordings.formats.filled import held_so_far, repeated_so_far
 from dynakin.recordings.formats.jumps import (
@@ -29,9 +30,6 @@ from dynakin.recordings.formats.jumps import (
     usual_distances,
     within,
 )
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 _KEPT = 4 * AROUND + 4 * BESIDE
 _DECIDED = 2 * BESIDE

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import rms_length
+from dynakin.arrays import Array, rms_length
 from dynakin.elements import element
 from dynakin.filter.step import StepEstimate
 from dynakin.filter.tracker import Tracker
@@ -19,8 +18,6 @@ from dynakin.results.records import NO_ESTIMATE
 from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.plates import LivePlates
 from dynakin.stream.sinks.base import Status
-
-Array = npt.NDArray[np.float64]
 
 _SETTLE_S = 5.0  # constants that moved by less than their own standard deviation in so long have settled
 _SOON_S = 1.0

@@ -4,15 +4,12 @@ what of them is no measurement."""
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.recordings.limits import LARGEST_MOMENT_NM
 from dynakin.recordings.plates.stuck import SOON, frozen
 from dynakin.recordings.resampling import PASS, CausalLowPass, latest_before, low_pass_for, reach_s
 from dynakin.stream.sources.clock import Pace
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 _FILLED_S = 0.02  # gaps up to this are bridged by a straight line; after longer ones the low-pass begins anew
 _KEPT_S = 2.0

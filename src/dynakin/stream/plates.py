@@ -10,8 +10,8 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.ground.axes import turned_axes
@@ -25,7 +25,6 @@ from dynakin.recordings.plates.stuck import frozen_live_in_words
 from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.start import check_loaded, floor_plate, loaded, recording_of
 
-Array = npt.NDArray[np.float64]
 Say = Callable[[str | Message], None]
 
 WINDOW_S, FIRST_S, RARELY_S = 8.0, 4.0, 60.0

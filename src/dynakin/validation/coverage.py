@@ -15,14 +15,13 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from dynakin.arrays import rms
+from dynakin.arrays import Array, rms
 from dynakin.results.measures.consistency import CONSISTENT, INSIDE, Judgement, judge, mean_interval_95
 from dynakin.results.records import Parameter
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 Z_95 = 1.959964  # a standard normal number lies within in 95 % of cases
 

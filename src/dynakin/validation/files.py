@@ -7,9 +7,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from dynakin.files import expanded, write_csv
-from dynakin.results.files.config import versions, write_metrics
-from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
+from dynakin.files import expanded, write_csv, write_json
+from dynakin.results.files.config import versions
+from dynakin.results.files.folder import FolderKind, replacing
 from dynakin.validation.table2 import Spread
 
 SCHEMA_VERSION = 1
@@ -40,15 +40,6 @@ def flat(row: Any) -> dict[str, Any]:
     return found
 
 
-def check_comparison_folder(folder: str | Path) -> None:
-    """Make sure, before anything long is computed, that a comparison can be written to ``folder``.
-
-    Raises:
-        OutputError: a file is in the way, the place cannot be written, or the folder holds something else.
-    """
-    check_output_writable(folder, kind=COMPARISON)
-
-
 def save_comparison(
     folder: str | Path,
     tables: Mapping[str, Sequence[Any]],
@@ -66,7 +57,7 @@ def save_comparison(
         page: the report as HTML (`dynakin.report.render_comparison`); none is written without it.
 
     Raises:
-        OutputError: as `check_comparison_folder`.
+        OutputError: as `dynakin.results.files.folder.check_output_writable`.
     """
     folder = expanded(folder)
     plain = {name: [flat(row) for row in rows] for name, rows in tables.items() if rows}
@@ -75,7 +66,7 @@ def save_comparison(
     with replacing(folder, kind=COMPARISON) as made:
         for name, rows in plain.items():
             write_csv(made / f"{name}.csv", rows)
-        write_metrics(summary, made / _SUMMARY)
+        write_json(made / _SUMMARY, summary)
         if page is not None:
             (made / "report.html").write_text(page, encoding="utf-8", newline="\n")
     return folder

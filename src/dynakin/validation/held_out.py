@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.blas import one_blas_thread
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
@@ -33,8 +33,6 @@ from dynakin.validation.reference.inverse_dynamics import inverse_name, rigid_mo
 from dynakin.validation.reference.least_squares import identify, predicted_wrench
 from dynakin.validation.reference.methods import reference_methods
 from dynakin.validation.table2 import Row, spread, unit_of
-
-Array = npt.NDArray[np.float64]
 
 BATCH, CHOSEN = "batch inertia", "chosen"
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.blas import one_blas_thread
 from dynakin.errors import DynakinError, LostError, ModelError
 from dynakin.filter.prepared import Prepared
@@ -45,8 +45,6 @@ from dynakin.validation.reference.methods import Lengths, Reference, reference_m
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 AT = "AT"
 CLASSICAL = "classical"
@@ -99,13 +97,13 @@ class ComparedTrial:
 
     name: str
     time: Array
-    window: Mask
+    window: Flags
     marker_names: tuple[str, ...]
     coordinate_names: tuple[str, ...]
     measured_markers: Array
     measured_wrench: Array
-    axes: Mask
-    rotation: Mask
+    axes: Flags
+    rotation: Flags
     repetitions: Found
     mass_kg: float
     methods: tuple[Method, ...]

@@ -7,14 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import rms_length
+from dynakin.arrays import Array, Flags, rms_length
 from dynakin.results.measures.fit import SignalFit, signal_fit
 from dynakin.units import COMPONENTS
-from dynakin.validation.methods import ComparedTrial, Mask
-
-Array = npt.NDArray[np.float64]
+from dynakin.validation.methods import ComparedTrial
 
 MARKERS = "markers"
 """Name of the rows that are means over all markers."""
@@ -37,7 +34,7 @@ class Row:
     correlation: Spread
 
 
-def marker_fit(measured: Array, estimated: Array, axes: Mask) -> SignalFit:
+def marker_fit(measured: Array, estimated: Array, axes: Flags) -> SignalFit:
     """Agreement of one marker's path, RMS in mm.
 
     A place has no zero of its own, so per cent are of the path's size about its mean: its RMS distance from there, and

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import rms
+from dynakin.arrays import Array, rms
 from dynakin.messages import note
 from dynakin.results.estimate import values_of
 from dynakin.results.measures.adaptation import constant_groups
@@ -24,7 +24,6 @@ from dynakin.validation.table2 import Spread, spread
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 LEG = ("ankle", "knee", "hip")
 """Joints of a leg in the built-in planar models."""

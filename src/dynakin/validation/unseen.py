@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.blas import one_blas_thread
@@ -37,8 +36,6 @@ from dynakin.validation.yardsticks import (
     span_frames,
     with_mean,
 )
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
-from dynakin.arrays import wrench_about
+from dynakin.arrays import Array, wrench_about
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.prepared import Prepared
@@ -40,8 +40,6 @@ from dynakin.validation.yardsticks import (
     span_frames,
     with_mean,
 )
-
-Array = npt.NDArray[np.float64]
 
 _BLOCKS = ("coordinates", "speeds", "accelerations")
 _PAST_S = 0.5

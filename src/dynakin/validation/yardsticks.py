@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.filter.measurements import Measurements
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.times import step_of
@@ -17,7 +18,6 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.units import COMPONENTS
 from dynakin.validation.table2 import MARKERS, spread
 
-Array = npt.NDArray[np.float64]
 Figures = dict[tuple[str, str, str], float | None]  # (yardstick, quantity, method) -> RMS in the quantity's unit
 
 WITHHELD, LEFT_OUT = "plates withheld", "marker left out"

@@ -13,10 +13,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.bindings import _core
-from dynakin.filter.uncertainty.arms import Arms
 from dynakin.filter.uncertainty.geometry import BLOCKS, Geometry
 from dynakin.filter.uncertainty.loads import HANDS
-from dynakin.filter.uncertainty.mass_centres import unseen_limbs
+from dynakin.filter.uncertainty.mass_centres import Arms, unseen_limbs
 from dynakin.filter.uncertainty.sizes import LANDMARKS
 from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.filter.uncertainty.upright import trunks_of

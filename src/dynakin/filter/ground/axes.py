@@ -12,16 +12,12 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import rms, runs
+from dynakin.arrays import Array, Flags, rms, runs
 from dynakin.filter.ground.needed import NEAR, Needed
 from dynakin.recordings.plates.axes import TURNS, PlateAxes, turned_feet
 from dynakin.recordings.recording import Plate
 from dynakin.results.naming import listed
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 TURNED = 0.4
 """With other axes the horizontal force must be off by so much less: 0.9 times and more of 19 real recordings whose

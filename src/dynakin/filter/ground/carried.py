@@ -6,9 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import mean_seen
+from dynakin.arrays import Array, Flags, mean_seen
 from dynakin.filter.ground.closure import STATED
 from dynakin.filter.ground.mass_centre import second_derivative
 from dynakin.filter.ground.needed import Needed
@@ -17,9 +16,6 @@ from dynakin.filter.uncertainty.loads import HANDS
 from dynakin.messages import Message, about, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 HEAVY_KG, FOLLOWS, JUDGED_S = 2.0, 0.8, 2.0
 """Mass in both hands, and the part of the excess' variance that its acceleration explains. Chosen on simulated squats

@@ -11,18 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import rms_length, runs, widened
+from dynakin.arrays import Array, Flags, rms_length, runs, widened
 from dynakin.filter.ground.load_ratio import AMPLITUDE, VIGOROUS, load_ratio, window_means
 from dynakin.filter.ground.mass_centre import REACH_S, low_passed
 from dynakin.filter.ground.needed import Needed, smoothed
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.resampling import filled
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 EXCESS = 0.2
 """Part of the weight that must be missing, or too much. Well measured recordings (squats, a walk, a landing, a run at

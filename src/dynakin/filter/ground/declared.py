@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
-from dynakin.arrays import runs, widened
+from dynakin.arrays import Array, Flags, runs, widened
 from dynakin.filter.ground.closure import Closure
 from dynakin.filter.ground.expected import ContactPaths
 from dynakin.filter.uncertainty.loads import HANDS
@@ -24,9 +23,6 @@ from dynakin.recordings.pushes import JUDGED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.times import span
 from dynakin.settings.contacts import SEAT
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 LOW = 0.85
 """Part of its greatest height over the floor below which a pelvis may be on a seat: standing on one's toes is above, a

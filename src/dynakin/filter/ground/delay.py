@@ -11,14 +11,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.filter.ground.needed import NEAR, Needed
 from dynakin.filter.samples import in_step
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.naming import listed
-
-Array = npt.NDArray[np.float64]
 
 HELD_S = 0.02 + 1e-9
 """The first and the last sample stand for so much before and after."""

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from dynakin.arrays import filled, mean_seen
+from dynakin.arrays import Array, Flags, filled, mean_seen
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
 from dynakin.filter.ground.gain import SENSOR_M
 from dynakin.filter.ground.ground import Ground
@@ -29,10 +29,6 @@ from dynakin.recordings.pushes import LOADED_N
 from dynakin.settings.contacts import SEAT
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.uint8]
-Flags = npt.NDArray[np.bool_]
 
 PLATE_NOISE_N, PLATE_NOISE_NM = 2.0, 0.5
 """White noise of the usual plates, the moment about the centre of pressure."""

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
-from dynakin.arrays import runs, wrench_about
+from dynakin.arrays import Array, Flags, runs, wrench_about
 from dynakin.bindings import _core
 from dynakin.filter.ground.delay import Delay
 from dynakin.filter.ground.needed import Needed
@@ -28,9 +28,6 @@ from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.resampling import low_pass
 from dynakin.recordings.times import frame_numbers, on_grid
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 CUTOFF_HZ = 6.0
 """Low-pass of motion and plates, of one delay: none."""

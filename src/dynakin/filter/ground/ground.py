@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
+from dynakin.arrays import Flags
 from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
 from dynakin.messages import Message
 from dynakin.recordings.feet.loads import FootLoads
-
-Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

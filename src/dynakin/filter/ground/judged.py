@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.filter.ground.carried import (
     carried_in_hands,
     carried_in_words,
@@ -23,12 +22,11 @@ from dynakin.filter.ground.declared import (
     low_beside_feet,
     taken_in_words,
 )
-from dynakin.filter.ground.gain import found_gains
+from dynakin.filter.ground.gain import fitting_rate, found_gains, wrong_rate_in_words
 from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.on_ground import OnGround
 from dynakin.filter.ground.plate_errors import NO_ERRORS, VERTICAL_ONLY, PlateErrors
 from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
-from dynakin.filter.ground.rate import fitting_rate, wrong_rate_in_words
 from dynakin.filter.ground.shear import found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
 from dynakin.recordings.checks import PlateCheck
@@ -40,9 +38,6 @@ from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.pushes import LOADED_N
 from dynakin.recordings.times import spans
 from dynakin.settings.contacts import SEAT
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 
 def judged(on: OnGround) -> tuple[Ground, Array]:

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.delay import IN_STEP, Delay, apart_in_words, drift_in_words, out_of_step_in_words
@@ -23,8 +23,6 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.zero_offset import without_blanks, without_offsets
 from dynakin.recordings.recording import Recording
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
 
 SUPPORT = 0.03
 """Part of the weight by which the plates' load would be farther from it without what is read beside the feet: then

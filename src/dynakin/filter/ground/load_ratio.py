@@ -5,12 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
+from dynakin.arrays import Array, Flags, runs
 
 _WITHIN, _OFTEN, _ROUNDS = 0.15, 0.2, 3
 AMPLITUDE, LEFT_OPEN = 0.15, 0.02

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import rms, runs
+from dynakin.arrays import Array, Flags, rms, runs
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
@@ -16,9 +16,6 @@ from dynakin.model.spec import free_names
 from dynakin.recordings.resampling import low_pass
 from dynakin.recordings.times import rate_of
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 CUTOFF_HZ = 6.0
 """Low-pass of the path before it is differentiated."""

@@ -10,17 +10,14 @@ from copy import copy
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.filter.ground.mass_centre import MassCentre, mass_centre
 from dynakin.filter.sight import owners_of, root_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.times import rate_of
 from dynakin.results.measures.sources import out_of_sight
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 NEAR = 0.05
 """Part of the weight within which the force must then be what the motion needs; real recordings 0.007 to 0.04."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.axes import turned_axes
 from dynakin.filter.ground.declared import declared_contacts, plates_of_their_own
@@ -24,9 +24,6 @@ from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.plates.stuck import vertical_only
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import sentence
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 _CORRECT_MOMENTS = (
     "Correct the signs or the order of the plates' channels, or of their corners, in this file; if something else "

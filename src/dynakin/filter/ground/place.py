@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import filled
+from dynakin.arrays import Array, filled
 from dynakin.bindings import _core
 from dynakin.filter.ground.carried import says_carried
 from dynakin.filter.ground.ground import Ground
@@ -18,8 +17,6 @@ from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.results.naming import listed
 from dynakin.settings.contacts import SEAT
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
 
 OFF_PLACE_M, OFF_PLACE_S = 0.03, 0.15
 """How far, over so long at least, the estimated movement may have the force from where the plates do: 3 to 19 mm in 11

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.messages import Message, warning
 from dynakin.recordings.feet.loads import FootLoads
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 ANY_N = 1e4
 """Deviation, N (N m of the moment about the vertical), of what is not measured: any that a person makes, and little

@@ -7,9 +7,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.filter.ground.closure import Closure, closure
 from dynakin.filter.ground.declared import bearing
 from dynakin.filter.ground.needed import Needed
@@ -28,9 +27,6 @@ from dynakin.recordings.weight import likely_unit
 from dynakin.results.naming import listed
 from dynakin.settings.contacts import SEAT
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 MASS_APART = 0.05
 """Part of the weight by which the plates' mean may differ before the mass is doubted: movement explains 2 or 3 %."""

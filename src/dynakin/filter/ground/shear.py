@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_errors import PlateErrors
 from dynakin.messages import warning
-
-Array = npt.NDArray[np.float64]
 
 ZERO, ZERO_S = 0.015, 2.0
 """Part of the weight that the mean horizontal force may be off what the motion needs, over so long at least: on average

@@ -6,15 +6,13 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.filter.ground.closure import EDGE, EXCESS
 from dynakin.filter.ground.load_ratio import AMPLITUDE
 from dynakin.filter.ground.mass_centre import CentreWeights
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
 
 WINDOW_S = 0.3
 """The centre of mass' path over it is fitted by a parabola; what is found is of its middle, so `DELAY_S` ago."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError
 from dynakin.filter.contacts import ContactLoads
@@ -32,9 +32,6 @@ from dynakin.recordings.plates.stuck import STILL_N
 from dynakin.recordings.pushes import JUDGED_N
 from dynakin.results.naming import sentence
 from dynakin.settings.noise import Noise
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 _SEEN = 0.5  # part of the markers from which the motion of the centre of mass is seen
 _LEAST_S = 0.001  # between frames of which a share's rate is taken

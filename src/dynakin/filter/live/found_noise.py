@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.noise import LATE_SHARE, MOVED_S, SETTLING_S
 from dynakin.results.records import FOLLOWING, TRACKING
-
-Array = npt.NDArray[np.float64]
 
 MOVES_M_S = 0.3
 """Speed of markers (median) from which a frame counts in full: who stands shows the cameras alone."""

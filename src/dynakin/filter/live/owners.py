@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.filter.live.stances import DT_S, LiveStances
 from dynakin.recordings.feet.contact import ALONE_M, NEAR_M
 from dynakin.recordings.feet.findings import OFF_PLACE_M
@@ -13,9 +13,6 @@ from dynakin.recordings.feet.sharing import BETWEEN_M, SHORTEST_S, beside_m, lie
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 WRONG_S = 0.3
 """So long must a plate's load have lain under another foot than the declared one: half a stance of a walk."""

@@ -7,13 +7,11 @@ from collections import deque
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.belt import WINDOW_S, velocities
 from dynakin.recordings.feet.contact import ALOFT_M, LEVEL_M_S, NEAR_SUPPORT_M, RESTS_S, SLOW_M_S, pivots
 from dynakin.recordings.feet.soles import FootShape
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 DT_S = (0.001, 0.05)
 """Least and most that frames are taken to be apart."""

@@ -8,18 +8,17 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array, Codes
 from dynakin.bindings import _core
 from dynakin.filter.augment import variance_scales
 from dynakin.filter.noise import prior_factor
-from dynakin.filter.step import Codes, deviations_of
+from dynakin.filter.step import deviations_of
 from dynakin.filter.uncertainty.frames import Frames, as_believed
 from dynakin.filter.uncertainty.geometry import BLOCKS
 from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.recordings.times import step_of
 from dynakin.results.measures.sources import ABSENT, MEASURED
 from dynakin.settings.noise import Noise
-
-Array = npt.NDArray[np.float64]
 
 
 class Stepped(NamedTuple):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.bindings import _core
 from dynakin.filter.contacts import stands_off_plates
 from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Geometry
@@ -20,8 +21,6 @@ from dynakin.results.measures.sources import DERIVED, MEASURED, in_use, moment_s
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 _STEP_S = 0.005
 """Step along the motion over which effects are differentiated."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
+from dynakin.arrays import Array, Flags
 from dynakin.bindings import _core
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.filter.uncertainty.joint_errors import OF_FRAMES, JointErrors
@@ -15,9 +15,6 @@ from dynakin.filter.uncertainty.upright import neutral, trunks_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.settings.noise import Noise
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
 Blocks = dict[str, Array]

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.upright import floats, thighs_of
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -19,7 +20,6 @@ from dynakin.model.calibration.pose_start import bare
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.spec import free_coordinates, free_names
 
-Array = npt.NDArray[np.float64]
 Kind = Literal[
     "hinge_centre",
     "ball_centre",

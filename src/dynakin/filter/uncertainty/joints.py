@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.frames import Frame, differences
 from dynakin.filter.uncertainty.geometry import Geometry, Parts
@@ -12,8 +12,6 @@ from dynakin.filter.uncertainty.sizes import CENTRES, OF_JOINTS, less_sure_joint
 from dynakin.filter.uncertainty.upright import rolling_more, rolls
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.noise import Noise
-
-Array = npt.NDArray[np.float64]
 
 
 class Joints:

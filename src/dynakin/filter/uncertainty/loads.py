@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.frames import Frame, rates
@@ -18,7 +17,6 @@ from dynakin.units import GRAVITY_M_S2
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 HANDS = ("hand_r", "hand_l")
 """Segments that may hold something, by their names in `fullbody` and in OpenSim's models."""

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_solve
 
-from dynakin.arrays import rms
+from dynakin.arrays import Array, rms
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.frames import wrenches_of
 from dynakin.filter.uncertainty.geometry import BLOCKS, normal_factor
@@ -33,7 +33,6 @@ from dynakin.results.records import REFUSED
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 OF_SKIN = 0.5
 """Part of the declared size of skin that moves a segment's markers against its neighbour's where nothing is locked:

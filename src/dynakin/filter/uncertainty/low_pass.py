@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import rms
+from dynakin.arrays import Array, rms
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.frames import wrenches_of
 from dynakin.filter.uncertainty.geometry import BLOCKS, Geometry
@@ -21,7 +20,6 @@ from dynakin.results.naming import sentence, words
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 MATTERS = 0.75
 """Speeds that were taken, over the deviation that is reported without them (RMS, worst rotation), from which on it is a

@@ -4,14 +4,12 @@ systematic errors (`systematic`) of their sizes."""
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.filter.uncertainty.frames import Frames
 from dynakin.filter.uncertainty.geometry import Blocks, Parts
 from dynakin.filter.uncertainty.sizes import CENTRES, KINDS, Sizes
 from dynakin.results.measures.sources import MEASURED, PRIOR
-
-Array = npt.NDArray[np.float64]
 
 Factors = dict[str, tuple[float, float]]
 OWN_LATE: Factors = {"coordinates": (1.0, 0.0), "accelerations": (0.12, 0.04)}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.filter.uncertainty.frames import Frame, differences
 from dynakin.filter.uncertainty.geometry import Geometry, Parts
 from dynakin.filter.uncertainty.upright import drives, floats, followed
@@ -13,8 +13,6 @@ from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
 from dynakin.model.spec import free_coordinates
 from dynakin.model.state_priors import COMMON_SKIN
 from dynakin.results.records import FOLLOWING
-
-Array = npt.NDArray[np.float64]
 
 ROOT_SKIN = 4.0
 """Times as much skin as elsewhere counts on the segment that floats (the pelvis): what its markers do together no other

@@ -12,14 +12,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.filter.uncertainty.frames import Frame, Frames
 from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Geometry, Parts
-from dynakin.filter.uncertainty.inertia import Inertia
 from dynakin.filter.uncertainty.joints import Joints
 from dynakin.filter.uncertainty.loads import Clock, Hands, late_by
-from dynakin.filter.uncertainty.mass_centres import MassCentres
+from dynakin.filter.uncertainty.mass_centres import Inertia, MassCentres
 from dynakin.filter.uncertainty.reported import movement_intensity, reported
 from dynakin.filter.uncertainty.sizes import KINDS, Sizes, hips_unshown, usual_sizes
 from dynakin.filter.uncertainty.skin import Skin
@@ -32,7 +31,6 @@ from dynakin.settings.noise import Noise
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 MISFIT = 1.6
 """Times `Sizes.placed` from which a run says that a model was not scaled well: by truth 0.4 to 1.1 with the person's

@@ -8,12 +8,11 @@ from copy import copy
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
 from dynakin.model.spec import free_coordinates, free_names
-
-Array = npt.NDArray[np.float64]
 
 
 def floats(segment: _core.SegmentSpec) -> bool:

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.identification.observability.element_words import INERTIA, inertia_words, is_planar
 from dynakin.identification.observability.excitation import Bench, Excitation
 from dynakin.results.measures.posterior import KNOWN, NOTHING
 from dynakin.results.naming import listed, sentence, words
-
-Array = npt.NDArray[np.float64]
 
 GAIN = 1.25
 """Least factor on a standard deviation that is worth saying: a third of the variance."""

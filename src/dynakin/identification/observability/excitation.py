@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.known_motion import Known, KnownMotion
@@ -25,8 +25,6 @@ from dynakin.recordings.times import step_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import words
 from dynakin.simulation.jets import Jet, sinusoids, step
-
-Array = npt.NDArray[np.float64]
 
 LONGEST_S = 20.0  # of the trial that is tried: gains are ratios, a longer stretch changes both sides
 ROTATIONS = ((30.0, 1.0), (20.0, 1.0), (10.0, 1.0), (10.0, 0.5), (5.0, 1.0), (5.0, 0.5))

@@ -10,14 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.units import COMPONENTS
-
-Array = npt.NDArray[np.float64]
 
 ZERO = "zero/"
 _POSTURES = 60

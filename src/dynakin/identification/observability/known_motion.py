@@ -18,15 +18,13 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from dynakin.arrays import Array, Flags
 from dynakin.bindings import _core
 from dynakin.filter.augment import continuous_noise
 from dynakin.filter.contacts import carry
 from dynakin.filter.noise import process_variance, wrench_covariance
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.measured import MeasuredModel
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
 
 RATE_HZ = 10.0
 """Frames a second: what is tried swings once a second."""

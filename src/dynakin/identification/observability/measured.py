@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.noise import marker_variance, wrench_covariance
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
-
-Array = npt.NDArray[np.float64]
 
 _FASTEST, _HARDEST = 3.0, 30.0
 """rad/s and rad/s^2 (m/s, m/s^2): standard deviations of random motion, those of brisk gestures. Rank and gauges do not

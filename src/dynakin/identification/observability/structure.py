@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.blas import one_blas_thread
 from dynakin.errors import ModelError
 from dynakin.filter.tracker import Tracker
@@ -18,8 +18,6 @@ from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.results.naming import listed
 from dynakin.validation.reference.base_parameters import BaseParameters, base_parameters
 from dynakin.validation.reference.condensed import stacked
-
-Array = npt.NDArray[np.float64]
 
 _POSTURES = 400
 _NONE = 1e-9  # of a prior standard deviation: less of a number in every base parameter is rounding

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
-from dynakin.arrays import rms, runs
+from dynakin.arrays import Array, rms, runs
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.completion import Proportions
 from dynakin.model.calibration.frames import MarkedTrial
-from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
+from dynakin.model.calibration.landmarks import LandmarkFinder
+from dynakin.model.mirroring import SIDES
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.loads import FootLoads
@@ -24,8 +24,6 @@ from dynakin.recordings.recording import Recording
 from dynakin.recordings.weight import CONVERT, FORCE_UNITS_N, likely_unit, while_loaded
 from dynakin.settings.subject import Subject
 from dynakin.units import GRAVITY_M_S2
-
-Array = npt.NDArray[np.float64]
 
 _LEAST_S = 5.0
 """Of a movement that is to weigh a person: its mean force is the weight but for the momentum gained, and 2 m/s gained

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
@@ -22,7 +22,6 @@ from dynakin.recordings.pushes import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.tree import Tree
 
-Array = npt.NDArray[np.float64]
 Hips = Literal["measured", "functional", "supposed", "proportions"]
 
 UNMARKED_SHARE = 0.09

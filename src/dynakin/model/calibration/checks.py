@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.frames import MarkedTrial
@@ -17,8 +17,6 @@ from dynakin.model.inertia import RigidBody
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
-
-Array = npt.NDArray[np.float64]
 
 BENT_DEG = 30.0
 """Of a knee, or of a thigh against the vertical, from which on a standing trial is doubted: in the standing trials that

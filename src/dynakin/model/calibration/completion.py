@@ -14,8 +14,8 @@ from functools import cache
 from importlib import resources
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note
 from dynakin.model.calibration.joint_motion import nearest_rotation
@@ -25,8 +25,6 @@ from dynakin.model.markers.anatomy import standing_at
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.schema import Frame, ModelFile, Segment
 from dynakin.model.table import BodyTable
-
-Array = npt.NDArray[np.float64]
 
 _MARKER_WEIGHT = 0.01
 """Of a marker on the skin next to a landmark: people differ there, but it shows where the segment faces."""

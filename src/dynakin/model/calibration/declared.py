@@ -12,6 +12,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ConfigError, ModelError
 from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.mirroring import SUFFIXES
 from dynakin.settings.contacts import SEAT, DeclaredContact
 from dynakin.settings.strict import nearest
 from dynakin.settings.subject import CarriedLoad
@@ -62,9 +63,6 @@ def with_loads(initial: CalibratedModel, loads: Sequence[CarriedLoad]) -> Calibr
     )
 
 
-_SIDES = {"right": "r", "left": "l"}
-
-
 def with_contacts(initial: CalibratedModel, contacts: Sequence[DeclaredContact]) -> CalibratedModel:
     """The same model with declared contacts on its segments.
 
@@ -104,8 +102,8 @@ def _segment(initial: CalibratedModel, contact: DeclaredContact) -> str:
 def _spellings(name: str) -> list[str]:
     """hand_right as models call it: hand_r, right_hand."""
     found = [name]
-    for side, letter in _SIDES.items():
-        for stem in (name.removesuffix(f"_{side}"), name.removeprefix(f"{side}_"), name.removesuffix(f"_{letter}")):
+    for side, suffix in SUFFIXES.items():
+        for stem in (name.removesuffix(f"_{side}"), name.removeprefix(f"{side}_"), name.removesuffix(suffix)):
             if stem != name:
-                found += [f"{stem}_{side}", f"{stem}_{letter}", f"{side}_{stem}", f"{letter}_{stem}"]
+                found += [f"{stem}_{side}", f"{stem}{suffix}", f"{side}_{stem}", f"{suffix[1:]}_{stem}"]
     return found

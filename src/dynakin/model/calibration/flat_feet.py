@@ -8,9 +8,10 @@ import numpy as np
 
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.frames import MarkedTrial
-from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
+from dynakin.model.calibration.landmarks import LandmarkFinder, slope
 from dynakin.model.calibration.sites import Candidate
 from dynakin.model.markers.anatomy import standing_at
+from dynakin.model.mirroring import OTHER_SIDE, SIDES
 from dynakin.model.schema import ModelFile
 from dynakin.recordings.feet.contact import foot_contacts
 from dynakin.results.naming import listed
@@ -48,7 +49,7 @@ def lost_on_feet(trial: MarkedTrial, standing: MarkedTrial) -> list[Message]:
         lost = [name for key, name in standing.match.names.items() if name in names and key not in trial.match.names]
         if not lost:
             continue
-        other = len(trial.match.foot_markers["left" if side == "right" else "right"])
+        other = len(trial.match.foot_markers[OTHER_SIDE[side]])
         known = len(trial.match.foot_markers[side]) < other
         how = "as far as by the other foot" if known else "no further than its other markers"
         found.append(

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note
-from dynakin.model.calibration.landmarks import SIDES, Positions
+from dynakin.model.calibration.landmarks import Positions
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
+from dynakin.model.mirroring import SIDES
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.results.naming import plural
-
-Array = npt.NDArray[np.float64]
 
 FIRST_FRAMES = 10
 """How many frames stand in for a standing window where a trial has none (0.1 s at 100 Hz)."""

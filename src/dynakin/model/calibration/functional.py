@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note
 from dynakin.model.calibration.frames import MarkedTrial
@@ -28,8 +29,6 @@ from dynakin.model.markers.match import match_markers
 from dynakin.recordings.companions import another_person
 from dynakin.recordings.landmarks import find_marker
 from dynakin.recordings.recording import Recording
-
-Array = npt.NDArray[np.float64]
 
 SIDE_OF = {"r": "right", "l": "left"}
 _SEGMENTS = {"hip": ("pelvis", "thigh"), "knee": ("thigh", "shank"), "ankle": ("shank", "foot")}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
+from dynakin.recordings.frame import GroundFrame, find_ground_frame
 from dynakin.recordings.landmarks import FacingPairs
 from dynakin.recordings.recording import Recording
 from dynakin.settings.model import Bounds, Priors
@@ -36,9 +36,14 @@ class Calibration:
     def find_ground(
         self, recording: Recording, pairs: FacingPairs, static: Recording | None, *, floating: bool
     ) -> GroundFrame:
-        """The ground frame as one of the recordings shows it: the laboratory's own of a model that is floating."""
-        find = find_laboratory_frame if floating else find_ground_frame
-        return find(recording, vertical=self.vertical, forward=self.forward, pairs=pairs, static=static)
+        """The ground frame as one of the recordings shows it.
+
+        A model that is floating may head anywhere, so that nothing has to be turned back: the laboratory's own, Y up.
+        With ``forward`` given X is forward, as of others.
+        """
+        found = find_ground_frame(recording, vertical=self.vertical, forward=self.forward, pairs=pairs, static=static)
+        asked = not isinstance(self.forward, str) or self.forward.casefold() != "auto"
+        return found.upright() if floating and not asked else found
 
 
 AUTO = Calibration()

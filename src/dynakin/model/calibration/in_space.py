@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from dynakin.arrays import rms
+from dynakin.arrays import Array, rms
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note
@@ -19,8 +19,6 @@ from dynakin.model.calibration.sites import Candidate, site_of
 from dynakin.model.plan import Geometry, ModelPlan, Site
 from dynakin.model.schema import Interval, kinds_of
 from dynakin.model.spec import free_names, to_core
-
-Array = npt.NDArray[np.float64]
 
 _SEEN = 0.6
 """Share of the markers that a frame must show to start from it."""

@@ -8,14 +8,12 @@ solves it, from the frame before.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.pose_start import bare
 from dynakin.model.spec import free_coordinates
-
-Array = npt.NDArray[np.float64]
 
 FEWEST_MARKERS = 3
 _HOLD_M = 1e-4

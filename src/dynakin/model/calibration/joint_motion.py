@@ -15,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from dynakin.arrays import rms
-from dynakin.recordings.recording import Array
+from dynakin.arrays import Array, rms
 
 _FEWEST = 3
 SKIN_ANGLE_RAD = np.radians(50.0)

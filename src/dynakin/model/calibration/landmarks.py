@@ -6,20 +6,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.errors import ModelError
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.schema import Offset, PelvisRegression, PolarRegression, Recipe, by_sex
-from dynakin.model.mirroring import SUFFIXES
+from dynakin.model.mirroring import OTHER_SIDE, SIDES, SUFFIXES
 from dynakin.settings.subject import Sex
 
-Array = npt.NDArray[np.float64]
 Positions = dict[MarkerKey, Array]
 """Marker positions (3,) m in the ground frame, by marker and side."""
-
-SIDES = ("right", "left")
 
 
 def _sides(recipe: Recipe, side: str) -> tuple[str, ...]:
@@ -275,7 +271,7 @@ class LandmarkFinder:
     @staticmethod
     def _apart(marker: str, side: str, positions: Positions) -> Array:
         """From the other side's to one's own (3,) m."""
-        other = SIDES[1 - SIDES.index(side)]
+        other = OTHER_SIDE[side]
         return np.asarray(positions.get((marker, side), _NOWHERE) - positions.get((marker, other), _NOWHERE))
 
     def _offset(self, offset: Offset, side: str, point: Callable[[str], Array], positions: Positions) -> Array:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.completion import Completed, Proportions, laid
@@ -36,8 +37,6 @@ from dynakin.model.markers.match import MarkerMatch
 from dynakin.model.markers.recognise import CORRECT
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import listed, words
-
-Array = npt.NDArray[np.float64]
 
 LEG_JOINTS = ("knee_r", "knee_l", "ankle_r", "ankle_l")
 _RANGE_DEG = {"knee": KNEE_DEG, "ankle": 15.0}

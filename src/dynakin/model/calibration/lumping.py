@@ -14,16 +14,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.model.calibration.posture import Posture, axes_from
 from dynakin.model.inertia import RigidBody
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.schema import ModelFile, Segment
 from dynakin.model.table import PAIRED, BodyTable, Part
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

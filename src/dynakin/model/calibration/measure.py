@@ -28,7 +28,7 @@ from dynakin.model.calibration.frames import MarkedTrial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.how import Calibration
 from dynakin.model.calibration.landmark_markers import in_both, needed_markers, seen_together, table_markers
-from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
+from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.legs_in_motion import (
     LEG_JOINTS,
     Legs,
@@ -47,6 +47,7 @@ from dynakin.model.markers.fit import refuse_unfit
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.recognise import recognise, recognise_standing
 from dynakin.model.markers.schema import MarkerSetFile
+from dynakin.model.mirroring import SIDES
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable

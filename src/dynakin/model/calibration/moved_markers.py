@@ -14,15 +14,15 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.frames import MarkedTrial
-from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
+from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.legs_in_motion import LEG_JOINTS
 from dynakin.model.markers.fit import LEG, ROOT
 from dynakin.model.markers.match import MarkerKey
+from dynakin.model.mirroring import SIDES
 from dynakin.results.naming import listed
-
-Array = npt.NDArray[np.float64]
 
 _USUAL = (0.05, 0.95)
 """Quantiles of a distance over the trial between which one segment's may be while standing."""

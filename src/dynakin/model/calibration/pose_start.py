@@ -12,15 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import rms, wrapped
+from dynakin.arrays import Array, rms, wrapped
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.joint_motion import nearest_rotation
 from dynakin.model.calibration.posture import joint_coordinates, other_reading, turned
 from dynakin.model.schema import Interval, kinds_of
 from dynakin.model.spec import free_names
-
-Array = npt.NDArray[np.float64]
 
 GOOD_M = 0.010
 """Root mean square distance from which on nothing else is tried: less than skin moves."""

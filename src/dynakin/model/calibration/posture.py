@@ -10,7 +10,7 @@ from math import cos, sin, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import wrapped
+from dynakin.arrays import Array, wrapped
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.plan import Geometry
@@ -91,9 +91,6 @@ def other_reading(values: Array, turning: npt.NDArray[np.bool_]) -> Array:
     if len(turns) == 3:
         found[turns] = [values[turns[0]] + np.pi, np.pi - values[turns[1]], values[turns[2]] + np.pi]
     return found
-
-
-Array = npt.NDArray[np.float64]
 
 
 _LEAST_M, _LEAST_SINE = 1e-3, 1e-3

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.frames import FIRST_FRAMES, MarkedTrial
@@ -19,8 +19,6 @@ from dynakin.model.markers.schema import Marker
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.plan import Geometry, Site
 from dynakin.model.schema import ModelFile, WithoutMarkers
-
-Array = npt.NDArray[np.float64]
 
 SINCE_SKIN = 1.0
 """Standard deviation along each axis of how far skin has gone once all joints are far from standing, of the size that

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.messages import Message, note, warning
 from dynakin.model.calibration.calibrated import Hips
 from dynakin.model.calibration.frames import MarkedTrial
@@ -21,12 +22,10 @@ from dynakin.model.calibration.joint_motion import off_their_line, rigid_motion
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.markers.fit import ROOT
 from dynakin.model.markers.match import MarkerKey
+from dynakin.model.mirroring import OTHER_SIDE, SIDES
 from dynakin.model.schema import ModelFile
 from dynakin.results.naming import listed, words
 
-Array = npt.NDArray[np.float64]
-
-_OTHER = {"right": "left", "left": "right"}
 _FEWEST, _LEAST = 3, 2
 """Markers beside it that show where one is, and with which that is known but for a turn about the line through them."""
 _ALONG_M = 0.01
@@ -83,7 +82,7 @@ class Pelvis:
             place = _mirrored(source, key)
             if place is not None:
                 aliases = source.match.marker_set.marker(key[0]).aliases
-                name, other = aliases(key[1])[0], aliases(_OTHER[key[1]])[0]
+                name, other = aliases(key[1])[0], aliases(OTHER_SIDE[key[1]])[0]
                 source = _with(source, key, name, place)
                 supposed[key] = f"nothing shows {name}, so it is put where {other} is on the other side of the pelvis"
         return cls(source, supposed, tuple(messages))
@@ -162,7 +161,7 @@ def _framed(source: MarkedTrial) -> bool:
 def _needed(source: MarkedTrial) -> set[MarkerKey]:
     """Markers of both sides that regressions of the hips need."""
     recipes = [each for found in source.match.marker_set.recipes(False).values() for each in found]
-    return {(each.pelvis.asis, side) for each in recipes if each.pelvis is not None for side in _OTHER}
+    return {(each.pelvis.asis, side) for each in recipes if each.pelvis is not None for side in SIDES}
 
 
 def _beside(
@@ -213,11 +212,11 @@ def _mirrored(source: MarkedTrial, key: MarkerKey) -> Array | None:
     """The path (T, 3) m of a marker in the mirror of the middle plane, which pairs of markers show; None where there
     are none, or the other side has no such marker."""
     seen = _on_the_pelvis(source)
-    other = (key[0], _OTHER[key[1]])
+    other = (key[0], OTHER_SIDE[key[1]])
     pairs = [name for name, side in sorted(seen) if side == "right" and (name, "left") in seen]
     if not pairs or other not in seen:
         return None
-    right, left = (np.array([source.paths[name, side] for name in pairs]) for side in _OTHER)
+    right, left = (np.array([source.paths[name, side] for name in pairs]) for side in SIDES)
     across = (right - left).sum(axis=0)
     across /= np.linalg.norm(across, axis=1, keepdims=True)
     from_middle = source.paths[other] - 0.5 * (right + left).mean(axis=0)

@@ -10,11 +10,11 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
+from dynakin.model.mirroring import OTHER_SIDE
 from dynakin.recordings.recording import Recording
-
-Array = npt.NDArray[np.float64]
 
 _HEIGHT_M = 1.75  # where nothing shows it
 _PROPORTION_SD = 0.08  # of a distance: people are built differently
@@ -108,7 +108,7 @@ class Expected:
                 )  # fmt: skip
         up = at[:, None, 1] - at[None, :, 1]
         up[np.abs(up) < _ABOVE] = np.nan
-        other = {"right": "left", "left": "right", "centre": "centre"}
+        other = {**OTHER_SIDE, "centre": "centre"}
         mirror = np.array([spot.get((name, other[side]), k) for k, (name, side) in enumerate(keys)], dtype=int)
         placed = np.array([name in known for name, _ in keys], dtype=bool)
         paired = placed & np.array([(name, other[side]) in spot for name, side in keys], dtype=bool)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from dynakin.errors import ModelError
 from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.model.markers.sides import SIDE_WORDS, SideLetters, side_letters, words_of
+from dynakin.model.mirroring import OTHER_SIDE
 from dynakin.recordings.landmarks import FacingPairs, plain_name
 
 MarkerKey = tuple[str, str]
@@ -91,7 +92,7 @@ class MarkerMatch:
         of one on the other foot whose like is not seen."""
         found = {}
         feet = self._on_feet()
-        for side, other in (("right", "left"), ("left", "right")):
+        for side, other in OTHER_SIDE.items():
             if len(feet[side]) == 1 and len(feet[other]) > 1:
                 lone = next(key for key, name in self.names.items() if name == feet[side][0])
                 lost = next(

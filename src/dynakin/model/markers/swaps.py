@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.model.markers.geometry import (
     Deviations,
     Expected,
@@ -20,9 +21,9 @@ from dynakin.model.markers.geometry import (
     places_of,
 )
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
+from dynakin.model.mirroring import OTHER_SIDE
 from dynakin.recordings.recording import Recording
 
-Array = npt.NDArray[np.float64]
 Order = npt.NDArray[np.intp]
 
 _GAIN, _GAIN_OF_ONE = 8.0, 5.0
@@ -34,7 +35,6 @@ _STILL_WRONG = 4.0  # deviations of a distance
 _ODD = 2.5
 """Deviations. Chosen on one simulated walk with Oxford feet (1.8 at most, labelled rightly; a trochanter exchanged with
 a thigh's cluster 3.0), judged on two others and on all sets."""
-_OTHER = {"right": "left", "left": "right"}
 _MOST = 6  # exchanges in one recording
 _GROUPS = (
     ("leg", ("thigh", "shank", "foot", "toes")),
@@ -204,7 +204,7 @@ def _candidates(
     """Exchanges worth a trial: which with which, and words for them."""
     names = [match.names[key] for key in keys]
     spot = {key: k for k, key in enumerate(keys)}
-    mirror = [spot.get((name, _OTHER.get(side, ""))) for name, side in keys]
+    mirror = [spot.get((name, OTHER_SIDE.get(side, ""))) for name, side in keys]
     for i, j in np.argwhere(np.triu(promise > 0.5 * _GAIN, 1)).tolist():
         if promise[i, j] > _GAIN_OF_ONE:
             yield [(i, j)], f"{names[i]} and {names[j]}"

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note, warning
@@ -20,8 +20,6 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.recording import Recording
 from dynakin.settings.subject import Subject
-
-Array = npt.NDArray[np.float64]
 
 _MOST = 0.9  # a first frame shows at least this part of the markers of the fullest one
 _A_TURN = 1e-3  # rad: files write pi with few digits

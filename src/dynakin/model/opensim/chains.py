@@ -11,13 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.model.calibration.posture import turned
 from dynakin.model.opensim.description import Coupler, Joint, JointAxis
 from dynakin.model.opensim.functions import Chain, Function, constant, is_constant, is_linear, joined
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

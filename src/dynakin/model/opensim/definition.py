@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.messages import Message, note
@@ -49,7 +49,6 @@ from dynakin.settings.strict import nearest, validate
 from dynakin.settings.subject import Subject
 from dynakin.units import gravity_problem
 
-Array = npt.NDArray[np.float64]
 Site = tuple[Marker, str]
 """A marker of the file, and its name in the recording."""
 

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.model.inertia import RigidBody
 from dynakin.model.opensim.functions import Function
@@ -18,7 +18,6 @@ from dynakin.tree import Tree
 GROUND = "ground"
 """Name of what the first body hangs on."""
 
-Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
 

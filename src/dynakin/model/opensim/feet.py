@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 from dynakin.errors import ModelError
 from dynakin.model.markers.draft.by_name import on_foot, sided
+from dynakin.model.mirroring import SIDES
 from dynakin.model.opensim.description import GROUND, OpenSimModel
 from dynakin.settings.strict import nearest
 
-SIDES = ("right", "left")
 _HEEL = ("calcn", "calc", "hindfoot", "rearfoot", "heel")  # that has no other foot before it
 _FOOT = ("foot", "talus")  # a forefoot, or what carries the heel: only where no marker tells better
 

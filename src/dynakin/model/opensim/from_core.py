@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.model.calibration.posture import turned
 from dynakin.model.inertia import RigidBody, inertia_from
@@ -30,8 +30,6 @@ from dynakin.model.opensim.description import (
 )
 from dynakin.model.opensim.functions import IDENTITY, Function, constant, is_constant, joined, polynomial
 from dynakin.model.schema import Interval, Kind
-
-Array = npt.NDArray[np.float64]
 
 _APART = 1e-6  # sine of the angle between two axes
 

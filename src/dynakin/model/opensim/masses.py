@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.messages import Message, warning
 from dynakin.model.markers.draft.by_name import sided
 from dynakin.model.opensim.description import GROUND, Joint, OpenSimModel
@@ -21,8 +21,6 @@ least."""
 COUNTS_SHARE = 0.005
 """Of the whole mass, that the heavier of both sides has where they are compared: patella and talus weigh 0.1 %."""
 _ALONG = 0.5  # rad: a bone that turns about its own length (a radius) moves no mass; the other beside it may have it
-
-Array = npt.NDArray[np.float64]
 
 
 def doubtful_masses(source: OpenSimModel) -> list[Message]:

@@ -14,9 +14,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs, widened
+from dynakin.arrays import Array, Flags, runs, widened
 from dynakin.errors import ConfigError
 from dynakin.messages import note
 from dynakin.recordings.feet.contact import GAP_S, NEAR_SUPPORT_M, FootContact, foot_contacts, middle_velocity
@@ -31,10 +30,8 @@ from dynakin.recordings.feet.who_stands_where import WhoStandsWhere
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, GroundPlate
 from dynakin.recordings.pushes import JUDGED_N
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import marker_velocities
-
-Flags = npt.NDArray[np.bool_]
 
 STEP_S = 0.25
 """How long a foot may press a plate before its markers show that it stands, and after they show that it left."""

@@ -6,12 +6,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
-from dynakin.recordings.recording import Array
-
-Flags = npt.NDArray[np.bool_]
+from dynakin.arrays import Array, Flags, runs
 
 WINDOW_S = 4.0
 """Stretch over which a belt's speed is taken for one: some strides. It may change from one to the next."""

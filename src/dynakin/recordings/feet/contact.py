@@ -10,18 +10,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs, widened
+from dynakin.arrays import Array, Flags, runs, widened
 from dynakin.recordings.feet.belt import belt_velocities
 from dynakin.recordings.feet.places import filled_by_others, flat_heights, foot_places, lowest_together
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, SHOE_M, UNDER_MARKERS_M, GroundPlate, floor_height
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import marker_velocities
-
-Flags = npt.NDArray[np.bool_]
 
 NO_CONTACT, ON_PLATE, UNMEASURED, SHARED_PLATE = range(4)
 """Status of a contact, which is a segment that something may push (a foot), in a frame: nothing touches it and its

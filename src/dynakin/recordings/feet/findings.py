@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.messages import Message, together, warning
 from dynakin.recordings.feet.contact import NEAR_M, FootContact
 from dynakin.recordings.feet.soles import LONGEST_M, Soles, shape_of
@@ -20,10 +19,7 @@ from dynakin.recordings.feet.who_stands_where import WhoStandsWhere
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, GroundPlate
 from dynakin.recordings.pushes import JUDGED_N, MOST_OFFSET_N, UNLOADED_N
-from dynakin.recordings.recording import Array
 from dynakin.recordings.times import span
-
-Flags = npt.NDArray[np.bool_]
 
 OFF_PLACE_M = 0.06
 """Distance of centres of pressure from a foot's markers that is kept for three quarters of its load: no shoe is so

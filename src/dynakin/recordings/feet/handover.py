@@ -8,13 +8,9 @@ from math import factorial
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.recordings.feet.contact import FootContact
-from dynakin.recordings.recording import Array
-
-Flags = npt.NDArray[np.bool_]
 
 EARLY_S, LATE_S = 0.02, 0.07
 """How long before a foot's markers are slow and low the plates are touched, and how long after they are left, where its

@@ -10,15 +10,11 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.recordings.feet.contact import NEAR_M, FootContact
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.recording import Array
-
-Flags = npt.NDArray[np.bool_]
 
 ALIKE_M = 0.03
 """By how much the distances of markers of two feet differ that sit at the same places, put there by hand: by up to 0.02

@@ -8,16 +8,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import filled, runs
+from dynakin.arrays import Array, Flags, filled, runs
 from dynakin.messages import Message
 from dynakin.recordings.feet.contact import COP_REFUSED_M
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.pushes import JUDGED_N, LOADED_N, UNLOADED_N
-from dynakin.recordings.recording import Array
 from dynakin.units import GRAVITY_M_S2
-
-Flags = npt.NDArray[np.bool_]
 
 _HALF_SOLE_M = 0.15  # of a long shoe, from its middle to where its markers end at most
 NOT_ITS_M = _HALF_SOLE_M + COP_REFUSED_M

@@ -6,17 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.recordings.feet.contact import ALONE_M, COP_REFUSED_M, NEAR_M, FootContact
 from dynakin.recordings.feet.findings import reach_m
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, GroundPlate
 from dynakin.recordings.pushes import JUDGED_N
-from dynakin.recordings.recording import Array
-
-Flags = npt.NDArray[np.bool_]
 
 OFF_M = 0.10
 """A plate that lies so far off its place, which is warned of elsewhere, is still that of the foot on it."""

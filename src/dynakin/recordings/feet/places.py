@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, runs
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import find_marker
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 
 SWAYS_M = 0.01
 """How far every marker of a foot that is held in the air goes (all but a tenth of the time): of who stands on one leg

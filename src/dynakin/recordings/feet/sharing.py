@@ -12,18 +12,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from numpy.typing import ArrayLike
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.recordings.feet.contact import ALONE_M, FootContact
 from dynakin.recordings.feet.soles import shape_of
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.pushes import JUDGED_N
-from dynakin.recordings.recording import Array, Recording
-
-Flags = npt.NDArray[np.bool_]
+from dynakin.recordings.recording import Recording
 
 BETWEEN_M = ALONE_M
 """So far from the markers of two flat feet neither bears alone, where one of them has no other plate, or for most of a

@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import mean_seen, runs
+from dynakin.arrays import Array, Flags, mean_seen, runs
 from dynakin.recordings.feet.contact import FootContact
 from dynakin.recordings.feet.handover import BOTH_S, STEEPEST_STEP, Span, spans_of, stance_weights, supported
-from dynakin.recordings.recording import Array
-
-Flags = npt.NDArray[np.bool_]
 
 HALF_LENGTH_M, HALF_WIDTH_M = 0.13, 0.05
 """Of a grown person's shoe, where the markers do not show it."""

@@ -6,17 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.feet.contact import FootContact
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.pushes import JUDGED_N
-from dynakin.recordings.recording import Array
 from dynakin.recordings.times import span, spans
-
-Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import mean_seen, runs
+from dynakin.arrays import Array, Flags, mean_seen, runs
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.loads import MEASURED, SHARED, SWING
@@ -26,9 +25,7 @@ from dynakin.recordings.orientation import axis_vector
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.loads import without_wrench
 from dynakin.recordings.pushes import JUDGED_N, MOST_OFFSET_N, NOISE_N, UNLOADED_N
-from dynakin.recordings.recording import Array, Recording
-
-Flags = npt.NDArray[np.bool_]
+from dynakin.recordings.recording import Recording
 
 CLEAR_S, CLEAR_M = 0.5, 0.3
 """How long no foot must be near a plate, and how far (its middle) is surely not on it: its own length."""

@@ -9,10 +9,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
-from dynakin.recordings.formats.c3d_analog import analog_values
 from dynakin.recordings.formats.c3d_beside import first_frame, read_analog, read_events, read_subject
+from dynakin.recordings.formats.c3d_channels import analog_values
 from dynakin.recordings.formats.c3d_checks import check_c3d_file
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plates import read_plates
@@ -21,7 +22,7 @@ from dynakin.recordings.formats.points import Points, sort_points
 from dynakin.recordings.formats.textfile import check_unique, trial_name
 from dynakin.recordings.formats.trajectories import clean_markers, distinct_names, length_unit
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
 
 _Read = TypeVar("_Read")

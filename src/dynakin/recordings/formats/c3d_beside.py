@@ -9,10 +9,11 @@ from typing import Literal
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
 from dynakin.recordings.formats.c3d_parameters import Parameters
-from dynakin.recordings.recording import AnalogChannel, Array, Event
+from dynakin.recordings.recording import AnalogChannel, Event
 from dynakin.units import PERSON_HEIGHT_M, PERSON_MASS_KG
 
 _SIDES: dict[str, Literal["left", "right"]] = {"left": "left", "l": "left", "right": "right", "r": "right"}

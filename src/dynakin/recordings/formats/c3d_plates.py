@@ -14,14 +14,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, together, warning
 from dynakin.recordings.formats.c3d_channels import at_end_of_range, zero_frames, zeroed
 from dynakin.recordings.formats.c3d_parameters import Parameters
-from dynakin.recordings.formats.c3d_plate_types import TYPES, as_recorded, checked_origin, plate_wrench
-from dynakin.recordings.formats.c3d_plate_units import (
+from dynakin.recordings.formats.c3d_plate_types import (
+    TYPES,
     Strange,
+    as_recorded,
+    checked_origin,
     fitting_moments,
+    plate_wrench,
     strange_in_words,
     units_of,
     volts,
@@ -32,7 +36,7 @@ from dynakin.recordings.plates.dead import Channels, dead_channels
 from dynakin.recordings.plates.pressure import Surface, part_pulling, plate_from_wrench, read_while_empty
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words
 from dynakin.recordings.pushes import JUDGED_N, LASTING_PULL, UNLOADED_N
-from dynakin.recordings.recording import Array, Plate
+from dynakin.recordings.recording import Plate
 from dynakin.recordings.resampling import (
     CausalLowPass,
     ReadOptions,

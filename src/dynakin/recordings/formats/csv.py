@@ -20,6 +20,7 @@ from typing import Literal
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.messages import Message
 from dynakin.recordings.formats.grf_columns import parse_column
@@ -35,7 +36,7 @@ from dynakin.recordings.formats.textfile import (
     trial_name,
 )
 from dynakin.recordings.formats.trajectories import clean_markers, length_unit, timing_notes
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
 from dynakin.recordings.times import settled_times
 

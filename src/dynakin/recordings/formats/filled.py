@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
-from dynakin.recordings.recording import Array
+from dynakin.arrays import Array, runs
 
 MOVES_M_S = 0.1
 """Speed, median over the markers, from which the person moves."""

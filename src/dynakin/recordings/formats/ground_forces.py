@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, other_unit, parse_column
@@ -17,11 +17,9 @@ from dynakin.recordings.plates.axes import pulling, turned_in_words
 from dynakin.recordings.plates.pressure import Surface, main_axis, part_pulling, plate_from_wrench, read_while_empty
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
 from dynakin.recordings.pushes import LASTING_PULL, LOADED_N, UNLOADED_N
-from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.resampling import UNEVEN, ReadOptions, low_pass, reach_s, resample, same_times, touched
 from dynakin.recordings.times import rate_of, settled_times, spans, step_of
-
-Flags = npt.NDArray[np.bool_]
 
 _MIN_RATE_RATIO = 0.99
 _LEAST_COVER, _END_S = 0.5, 0.1

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import by_neighbours, runs
+from dynakin.arrays import Array, by_neighbours, runs
 from dynakin.messages import Message, warning
-from dynakin.recordings.recording import Array
 from dynakin.recordings.times import span, spans
 
 _SHAPE = np.array([1.0, -4.0, 6.0, -4.0, 1.0]) / 6.0

@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note
 from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows
-from dynakin.recordings.recording import Array
 
 _ENTRY = re.compile(
     r"^\s*(nRows|nColumns|inDegrees|datarows|datacolumns|name|range|version)\s*[=:\s]\s*(.+?)\s*$", re.I

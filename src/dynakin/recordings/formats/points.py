@@ -9,8 +9,8 @@ from itertools import combinations
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.messages import Message, note
-from dynakin.recordings.recording import Array
 
 _UNLABELLED = re.compile(r"^(\*\d*|_?(unlabell?ed|unidentified|unnamed|uname)\W*\d*)$", re.IGNORECASE)
 # What outputs are called, where no list names them: LHipAngles, RKneeMoment_1, r_knee_moment (an

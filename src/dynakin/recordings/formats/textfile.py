@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.files import read_bytes
 from dynakin.messages import Message, note
 from dynakin.recordings.limits import LONGEST_GAP_S, rate_problem
-from dynakin.recordings.recording import Array
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f]+")
 # What programs write for a value that is missing

@@ -9,12 +9,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import by_neighbours
+from dynakin.arrays import Array, by_neighbours
 from dynakin.errors import RecordingError
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.formats.filled import MOVES_M_S, held, repeated, straight
 from dynakin.recordings.formats.jumps import without_jumps
-from dynakin.recordings.recording import Array
 from dynakin.recordings.times import rate_of, step_of
 from dynakin.units import length_factor
 

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.messages import Message, note
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.pushes import JUDGED_N
-from dynakin.recordings.recording import Array, Plate
+from dynakin.recordings.recording import Plate
 
 TURNS: tuple[tuple[str, Array], ...] = (
     ("{second} points the other way", np.diag([1.0, -1.0])),

@@ -15,15 +15,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.messages import Message, warning
 from dynakin.recordings.plates.pressure import main_axis
 from dynakin.recordings.plates.stuck import STILL_N, vertical_only, without_frames
 from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
-from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.times import spans
 
-Flags = npt.NDArray[np.bool_]
 Levels = npt.NDArray[np.int_]
 STILL, NOISE, FOLLOWS, CLEAR = range(4)  # how a channel is, beside the load
 

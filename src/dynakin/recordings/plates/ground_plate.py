@@ -6,16 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import filled, runs
+from dynakin.arrays import Array, Flags, filled, runs
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.pushes import JUDGED_N, LOADED_N, UNLOADED_N
-from dynakin.recordings.recording import Array, Plate, Recording
-
-Flags = npt.NDArray[np.bool_]
+from dynakin.recordings.recording import Plate, Recording
 
 FLAT_FRAMES = 5
 """A loaded plate that stays at its own extreme to 1e-6 for so many frames is at the end of its range."""

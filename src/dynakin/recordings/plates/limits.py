@@ -8,10 +8,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.pushes import JUDGED_N
-from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.recording import Plate, Recording
 
 FRICTION = 1.5
 """Horizontal over vertical force. Shoes on force plates hold up to about 1, spikes to 1.2; our recordings, drop jumps

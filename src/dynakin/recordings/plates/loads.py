@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.messages import note
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
 from dynakin.recordings.orientation import axis_vector
 from dynakin.recordings.plates.pressure import Surface, centre_of_pressure
 from dynakin.recordings.pushes import UNLOADED_N
-from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.vertical import find_vertical
 from dynakin.settings.subject import PlateLoad
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.arrays import cross, filled
+from dynakin.arrays import Array, cross, filled
 from dynakin.recordings.pushes import JUDGED_N, LOADED_N, MOST_OFFSET_N, NOISE_N
-from dynakin.recordings.recording import Array, Plate
+from dynakin.recordings.recording import Plate
 
 _LEAST_IDLE = 0.05
 """Part of the time without a load in which a plate shows what it reads then."""

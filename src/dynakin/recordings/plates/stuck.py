@@ -9,16 +9,13 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Flags, runs
 from dynakin.messages import Message, warning
 from dynakin.recordings.plates.pressure import main_axis
 from dynakin.recordings.pushes import JUDGED_N
-from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.times import spans
-
-Flags = npt.NDArray[np.bool_]
 
 FROZEN, FROZEN_S = 5, 0.04
 """So many equal rows and so long, and so many times as many as the plate usually holds one for (a table brought to a

@@ -10,20 +10,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.ticker import MaxNLocator
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.report.figure import Figure
 from dynakin.report.styles import INK, QUIET
 from dynakin.results.files.netcdf import ONE_AT_A_TIME
 from dynakin.results.naming import number
-
-Array = npt.NDArray[np.float64]
 
 GAINS = ("log10_coordinate_variance", "log10_speed_variance", "log10_acceleration_variance")
 CRITERION = "criterion"

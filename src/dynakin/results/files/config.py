@@ -1,4 +1,4 @@
-"""``config.toml``, ``parameters.json`` and ``metrics.json``, and which versions made them."""
+"""``config.toml`` and ``parameters.json``, and which versions made them."""
 
 from __future__ import annotations
 
@@ -49,11 +49,6 @@ def write_parameters(estimate: Estimate, path: Path) -> None:
             "parameters": [asdict(parameter) for parameter in estimate.parameters],
         },
     )
-
-
-def write_metrics(metrics: dict[str, Any], path: Path) -> None:
-    """The figures of `dynakin.results.measures.metrics.compute_metrics`."""
-    write_json(path, metrics)
 
 
 _PACKAGES = ("dynakin", "numpy", "scipy", "xarray", "ezc3d")

@@ -9,9 +9,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.results.estimate import Estimate
 
-Array = npt.NDArray[np.float64]
 Signs = Literal["opensim", "clinical"]
 
 

@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
+from dynakin.arrays import Array
 from dynakin.messages import Message, warning
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.power import root_coordinates
-
-Array = npt.NDArray[np.float64]
 
 PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
 """OpenSim's turns of the pelvis, about Z, X and Y in this order (Rajagopal et al. 2016)."""

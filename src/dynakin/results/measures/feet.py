@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import rms, wrench_about
+from dynakin.arrays import Codes, rms, wrench_about
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.times import at_the_ends
 from dynakin.results.estimate import Estimate, values_of
@@ -25,7 +25,7 @@ FLIGHT = 0.05
 """Part of the weight up to which what is left in flight is an error of the motion; more carries the person."""
 
 
-def foot_sources(data: xr.Dataset) -> sources.Codes:
+def foot_sources(data: xr.Dataset) -> Codes:
     """(T, F) codes of `results.measures.sources` of the feet's wrenches; in the air they are known to be zero."""
     known = np.isfinite(values_of(data, "foot_wrench")).all(axis=2)
     return np.where(known, values_of(data, "foot_source"), sources.ABSENT).astype(np.uint8)

@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.repetitions import Movement, Repetition, repetitions_of
 from dynakin.results.measures.sources import measured_moments, measured_wrench
 from dynakin.results.naming import plural
 from dynakin.units import COMPONENTS
-
-Array = npt.NDArray[np.float64]
 
 PERCENT = np.linspace(0.0, 100.0, 101)
 MEASURED = "measured"

@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.results.estimate import Estimate, tree_of
 from dynakin.results.measures.stances import counted
-
-Array = npt.NDArray[np.float64]
 
 
 class Work(NamedTuple):

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.recordings.plates.ground_plate import SAME_LEVEL_M, surface_height
 from dynakin.recordings.plates.ground_plate import floor_height as recorded_floor
 from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.pushes import LOADED_N
 from dynakin.results.estimate import Estimate
-
-Array = npt.NDArray[np.float64]
 
 
 def centre_of_pressure(wrench: Array, height_m: float | Array, threshold_n: float = LOADED_N) -> tuple[Array, Array]:

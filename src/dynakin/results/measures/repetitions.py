@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import peaks, runs
+from dynakin.arrays import Array, peaks, runs
 from dynakin.errors import RecordingError
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, find_marker
@@ -19,7 +19,6 @@ from dynakin.recordings.smoothing import smooth
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import evaluation_window
 
-Array = npt.NDArray[np.float64]
 Movement = Literal["squat", "gait"]
 
 SQUAT_CUTOFF_HZ, GAIT_CUTOFF_HZ = 2.0, 6.0

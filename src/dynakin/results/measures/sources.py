@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import Array, Codes, runs
 from dynakin.recordings.feet.contact import SHARED_PLATE, UNMEASURED
 from dynakin.recordings.times import span
 from dynakin.results.estimate import Estimate, tree_of, values_of
@@ -24,8 +24,6 @@ from dynakin.results.records import REFUSED
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
-Codes = npt.NDArray[np.uint8]
 Hidden = dict[str, npt.NDArray[np.bool_]]
 
 UNSEEN_S = 0.2
@@ -69,9 +67,7 @@ walk and a squat each: two are as sure as said, one was 2.7 and 3 times further 
 by two the squat holds, of the walk tilt does and list is 2.2 to 2.5 deg off, said 0.7 to 0.8."""
 
 
-def out_of_sight(
-    seen: npt.NDArray[np.bool_], owners: Sequence[str], time: npt.NDArray[np.float64], root: str = ""
-) -> Hidden:
+def out_of_sight(seen: npt.NDArray[np.bool_], owners: Sequence[str], time: Array, root: str = "") -> Hidden:
     """Segment with markers -> (T,) frames that lie in a stretch of more than `UNSEEN_S` in which none of them is seen,
     of the root fewer than `LEAST_OF_ROOT`; of one of which that many never are, no frame.
 
@@ -99,7 +95,7 @@ def taken_back(seen: npt.NDArray[np.bool_], refused: npt.NDArray[np.bool_]) -> n
     return found
 
 
-def unseen_in_words(hidden: Hidden, time: npt.NDArray[np.float64], root: str = "") -> str:
+def unseen_in_words(hidden: Hidden, time: Array, root: str = "") -> str:
     """A sentence on segments that are `out_of_sight`, and when; "" where none is."""
     spans = {name: [span(time, a, b) for a, b in runs(own)] for name, own in hidden.items()}
     each = {name: f"of {words(name)} from {listed(own, 3)}" for name, own in spans.items() if own}
@@ -124,7 +120,7 @@ def too_long(unseen_s: npt.ArrayLike) -> npt.NDArray[np.bool_]:
     return np.asarray(np.asarray(unseen_s) > UNSEEN_S + 1e-9)
 
 
-def in_use(seen: npt.NDArray[np.bool_], time: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+def in_use(seen: npt.NDArray[np.bool_], time: Array) -> npt.NDArray[np.bool_]:
     """(T, M) markers that show where the body is: seen (T, M), or not for up to `UNSEEN_S`."""
     hidden = out_of_sight(seen, [str(k) for k in range(seen.shape[1])], time)
     return np.stack([~own for own in hidden.values()], axis=1) & seen.any(axis=0)

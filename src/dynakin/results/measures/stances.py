@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Flags
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
-
-Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

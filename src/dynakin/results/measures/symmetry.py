@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.power import work_of
 from dynakin.results.measures.stances import compared_stances
-
-Array = npt.NDArray[np.float64]
 
 WHAT = "(right - left) / mean of both, per cent (Robinson, Herzog and Nigg 1987): positive where the right is larger"
 

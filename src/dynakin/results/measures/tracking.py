@@ -6,9 +6,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from dynakin.arrays import rms, runs
+from dynakin.arrays import Array, Flags, rms, runs
 from dynakin.errors import LostError
 from dynakin.messages import warning
 from dynakin.recordings.times import spans
@@ -17,9 +16,6 @@ from dynakin.results.measures.soft_tissue import marker_sites, state_paths
 from dynakin.results.measures.sources import ABSENT
 from dynakin.results.naming import listed, sentence
 from dynakin.results.records import NO_ESTIMATE_CODES, REFUSED, Tracking
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 ASTRAY_M = 0.060
 """A marker further than this from its place on the bone is astray: skin moves by 40 mm at most, and a start posture
@@ -112,7 +108,7 @@ def in_words(estimate: Estimate, found: Tracking) -> str:
     return f"the person was lost: {'; '.join(parts)}."
 
 
-def _mostly(estimate: Estimate, found: Tracking, frames: Mask) -> str:
+def _mostly(estimate: Estimate, found: Tracking, frames: Flags) -> str:
     """The markers that are astray or refused in half of these frames and more, the most often first; nothing where
     they are more than a third of all, which names nobody."""
     off = ((found.distance_m > ASTRAY_M) | found.refused)[frames].mean(axis=0)
@@ -212,7 +208,7 @@ def _worn(estimate: Estimate) -> dict[str, list[int]]:
     return {segment: columns for segment, columns in worn.items() if len(columns) > 1}
 
 
-def _limb_lost(estimate: Estimate, seen: Mask, refused: Mask) -> Mask:
+def _limb_lost(estimate: Estimate, seen: Flags, refused: Flags) -> Flags:
     """(T,) frames in which some segment's markers are all refused, for `LIMB_S` on end."""
     found = np.zeros(len(estimate.time), dtype=bool)
     for columns in _worn(estimate).values():
@@ -223,7 +219,7 @@ def _limb_lost(estimate: Estimate, seen: Mask, refused: Mask) -> Mask:
     return found
 
 
-def _bridged(lost: Mask, time: Array) -> Mask:
+def _bridged(lost: Flags, time: Array) -> Flags:
     bridged = lost.copy()
     for first, end in runs(~lost):
         if first > 0 and end < len(time) and time[end] - time[first - 1] < BRIDGED_S:

@@ -9,14 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.simulation.bodies.markers import HipCentres, Site
 from dynakin.simulation.bodies.posture import PosturePath
 from dynakin.simulation.bodies.subject import SimulatedSubject
 from dynakin.simulation.mechanics import Segment
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

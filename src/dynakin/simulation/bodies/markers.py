@@ -6,13 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.simulation.bodies.subject import SimulatedSubject
 from dynakin.simulation.mechanics import TreeMotion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynakin.arrays import wrapped
+from dynakin.arrays import Array, wrapped
 from dynakin.errors import ConfigError
 from dynakin.simulation.jets import Jet, polynomial
 from dynakin.simulation.mechanics import Segment, at_rest
-
-Array = NDArray[np.float64]
 
 _DEGREE = 4  # of the balanced coordinate's polynomial: 0.1 deg from the exact balance over the whole path
 

@@ -13,13 +13,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError, ModelError
 from dynakin.model.table import PAIRED, BodyTable, load_table
 from dynakin.settings.subject import Subject
-
-Array = NDArray[np.float64]
 
 # Distances between joint centres over body height: Drillis & Contini (1966) as in Winter, Biomechanics and
 # Motor Control of Human Movement (2009), fig. 4.1, where it gives them; the toe landmark is the marker on the

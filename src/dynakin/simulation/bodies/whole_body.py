@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.simulation.bodies.body import Contact, SimulatedBody
 from dynakin.simulation.bodies.marker_rows import SETS, draw_sites
@@ -28,7 +28,6 @@ from dynakin.simulation.bodies.subject import (
 from dynakin.simulation.bodies.worn import worn_sites
 from dynakin.simulation.mechanics import Axis, Segment
 
-Array = NDArray[np.float64]
 Direction = tuple[float, float, float]
 
 SIDES = (("r", 1.0), ("l", -1.0))

@@ -13,14 +13,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.simulation.bodies.marker_rows import MALLEOLI, ON_ANKLE, ON_ELBOW, ON_KNEE, PAIRED, draw_sites
 from dynakin.simulation.bodies.markers import MarkerList, Row, Site
 from dynakin.simulation.bodies.subject import SimulatedSubject
-
-Array = NDArray[np.float64]
 
 # Place -> part, region, x, y, lateral, whether a landmark.
 _PLACES: Mapping[str, tuple[str, str, float, float, float, bool]] = {

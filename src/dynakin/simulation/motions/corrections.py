@@ -11,15 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 from scipy.sparse import csr_matrix, diags
 from scipy.sparse.linalg import spsolve
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.simulation.jets import Jet
-
-Array = NDArray[np.float64]
 
 _DEGREE = 5
 _SPAN = _DEGREE + 1

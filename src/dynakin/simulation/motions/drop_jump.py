@@ -18,9 +18,8 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES, Sole, ankle_height, hip_in_pelvis
@@ -31,8 +30,6 @@ from dynakin.simulation.motions.flight import Flight, Jump, plan_flight
 from dynakin.simulation.motions.movement import Movement, Repetition
 from dynakin.simulation.motions.posed import foot_about, whole_motion
 from dynakin.simulation.support import Footing, Support
-
-Array = NDArray[np.float64]
 
 _G = -float(GRAVITY[1])
 

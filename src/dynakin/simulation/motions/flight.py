@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator, PPoly
 from scipy.optimize import brentq
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.simulation.jets import Jet, step
 from dynakin.simulation.mechanics import GRAVITY
 
-Array = NDArray[np.float64]
 Pulse = Callable[[Array], Array]
 
 _G = -float(GRAVITY[1])

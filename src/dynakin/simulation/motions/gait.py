@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES, Sole, hip_in_pelvis
@@ -21,8 +21,6 @@ from dynakin.simulation.motions.movement import Movement, Reach
 from dynakin.simulation.motions.posed import carried_frame
 from dynakin.simulation.motions.walk import FITTED, TOE_OFF, Walk, Waves, posture, support_of, walking_motion
 from dynakin.simulation.support import Footing, Support
-
-Array = NDArray[np.float64]
 
 SHORTEST_S = 2.5
 PLATES_AT = np.array([0.60, 0.0, 0.40])  # the middle plate, on the laboratory's floor, m

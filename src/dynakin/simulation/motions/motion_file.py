@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.resampling import low_pass
@@ -16,8 +16,6 @@ from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.movement import Movement
-
-Array = NDArray[np.float64]
 
 _DEGREE = 5  # a quintic spline: forces, from its second derivative, have no corners
 _FEWEST_ROWS = 20

@@ -6,13 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.simulation.jets import Jet
 from dynakin.simulation.mechanics import Motion, TreeMotion
 from dynakin.simulation.support import Footing, Support
-
-Array = NDArray[np.float64]
 
 STANDING_S = 1.5  # quiet standing before anything else: the filter's and the plates' start
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.errors import ConfigError
 from dynakin.simulation.jets import Jet, constant
 from dynakin.simulation.mechanics import Axis, Motion, Segment, SegmentMotion, TreeMotion, at_rest, kinematics
 from dynakin.simulation.motions.movement import in_order
 
-Array = NDArray[np.float64]
 Point = tuple[Jet, Jet, Jet]
 """Ground coordinates x, y, z over time, m."""
 

@@ -6,17 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES
 from dynakin.simulation.jets import constant, sinusoids, step
 from dynakin.simulation.mechanics import GRAVITY, Motion, Segment, TreeMotion, kinematics
 from dynakin.simulation.motions.movement import Hand, Movement
-
-Array = NDArray[np.float64]
 
 HARDEST = 0.3  # of body weight, all hands together
 # From the shoulder to the rail, over the arm's length: forward, up and outward; of who stays, in his first posture.

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.files import is_file
 from dynakin.settings.strict import nearest
@@ -19,12 +19,9 @@ from dynakin.simulation.motions.motion_file import file_movement
 from dynakin.simulation.motions.movement import Movement
 from dynakin.simulation.motions.sit_in_space import sit_in_space
 from dynakin.simulation.motions.sit_to_stand import sit_to_stand_movement
-from dynakin.simulation.motions.squat import squat_movement
+from dynakin.simulation.motions.squat import squat_movement, sway_movement
 from dynakin.simulation.motions.squat_in_space import squat_in_space
 from dynakin.simulation.motions.steps import steps_down, steps_up
-from dynakin.simulation.motions.sway import sway_movement
-
-Array = NDArray[np.float64]
 
 MOTIONS: dict[str, Callable[[np.random.Generator, SimulatedBody, float], Movement]] = {
     "squat": squat_movement,

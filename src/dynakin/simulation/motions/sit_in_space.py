@@ -6,8 +6,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import Sole
 from dynakin.simulation.jets import constant, polynomial
@@ -28,8 +28,6 @@ from dynakin.simulation.motions.squat_in_space import (
     upper_body,
 )
 from dynakin.simulation.support import Footing, Seated, Support
-
-Array = NDArray[np.float64]
 
 # Angles (deg) standing, and what sitting adds: feet drawn back under a seat as high as the knee, as people place them
 # before they rise (Janssen et al. 2002, Phys Ther 82:866-879); arms reach forward.

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.posture import PosturePath, balance, balanced_angle, posture_jets
@@ -16,8 +16,6 @@ from dynakin.simulation.jets import Jet, constant, step
 from dynakin.simulation.mechanics import Motion, at_rest
 from dynakin.simulation.motions.movement import STANDING_S, Movement, Repetition, Seat, in_order
 from dynakin.simulation.motions.squat import add_wander, draw_wander
-
-Array = NDArray[np.float64]
 
 SHORTEST_S = 10.5
 SEAT_FROM_HIP = (-0.02, -0.05)  # forward and up, of body height: flesh and the sitting bones, a little behind

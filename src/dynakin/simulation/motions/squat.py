@@ -1,4 +1,5 @@
-"""Squats: repetitions of varying depth and pace, arms moving, in balance over flat feet."""
+"""Over flat feet in balance: squats, repetitions of varying depth and pace, arms moving; and standing and swaying, more
+than quiet standing."""
 
 from __future__ import annotations
 
@@ -6,16 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.posture import balance, posture_jets
 from dynakin.simulation.jets import Jet, constant, sinusoids, step
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.movement import STANDING_S, Movement, Repetition, in_order
-
-Array = NDArray[np.float64]
 
 SHORTEST_S = 5.0
 SWAYING = ("ankle", "hip", "lumbar")
@@ -111,3 +110,41 @@ def add_wander(jets: dict[str, Jet], wander: Sequence[tuple[Array, Array]], time
         for name, (f, phases) in zip(SWAYING, wander, strict=True)
     }
     return jets | swayed
+
+
+SHORTEST_SWAY_S = 3.0
+# Root mean square of each coordinate's sway, deg: ankle and hip strategies together, the arms hanging loosely.
+SWAY_SIZE_DEG = {"ankle": 0.7, "knee": 0.6, "hip": 1.5, "lumbar": 1.2, "shoulder": 2.0, "elbow": 2.0}
+SWAY_BAND_HZ = (0.05, 0.6)
+SWAY_QUIET = 0.1  # part of it during the quiet standing before
+_SWAY_TONES = 6
+
+
+def sway_movement(rng: np.random.Generator, body: SimulatedBody, duration_s: float) -> Movement:
+    """Sway about standing in balance, each coordinate on its own, an analytic function of time.
+
+    Raises:
+        ConfigError: too short.
+    """
+    if not duration_s >= SHORTEST_SWAY_S:
+        raise ConfigError(f"simulated sway: duration_s is {duration_s:g}, expected at least {SHORTEST_SWAY_S:g} s")
+    path = body.paths["sway"]
+    balanced = balance(body.tree, path)
+    names = [name for name in body.coordinates if name in SWAY_SIZE_DEG]
+    frequencies = rng.uniform(*SWAY_BAND_HZ, (len(names), _SWAY_TONES))
+    phases = rng.uniform(0.0, 2.0 * np.pi, (len(names), _SWAY_TONES))
+
+    def at(time: Array) -> Motion:
+        rest = constant(time, 0.0)
+        jets = posture_jets(path, balanced, rest, rest)
+        envelope = (1.0 - SWAY_QUIET) * step(time, STANDING_S, 1.0) + SWAY_QUIET
+        for k, name in enumerate(names):
+            jets[name] = jets[name] + envelope * _sway_tones(time, SWAY_SIZE_DEG[name], frequencies[k], phases[k])
+        return in_order(body.coordinates, jets)
+
+    return Movement("sway", at, "standing and swaying")
+
+
+def _sway_tones(time: Array, size_deg: float, frequencies: Array, phases: Array) -> Jet:
+    amplitude = np.deg2rad(size_deg) * np.sqrt(2.0 / _SWAY_TONES)
+    return sinusoids(time, np.full(_SWAY_TONES, amplitude), frequencies, phases)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES, Sole, ankle_height, hip_in_pelvis
@@ -17,8 +17,6 @@ from dynakin.simulation.motions.movement import Movement, Repetition, in_order
 from dynakin.simulation.motions.posed import Point, foot_about, point_of, whole_motion
 from dynakin.simulation.motions.squat import draw_squats, squat_signals
 from dynakin.simulation.support import Footing, Support
-
-Array = NDArray[np.float64]
 
 STANDS_AT = np.array([0.35, 0.0, 0.40])  # middle between the ankles, on the laboratory's floor, m
 _PLATE_AHEAD_M = 0.08  # of the ankles

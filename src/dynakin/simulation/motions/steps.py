@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES, Sole, hip_in_pelvis
 from dynakin.simulation.jets import Jet
@@ -19,8 +18,6 @@ from dynakin.simulation.motions.movement import Movement
 from dynakin.simulation.motions.posed import whole_motion
 from dynakin.simulation.motions.walk import TOE_OFF, Walk, posture, support_of
 from dynakin.simulation.support import Footing, Support
-
-Array = NDArray[np.float64]
 
 # Heights of a step, m: up as public stairs (0.15 to 0.17); down low ones, as one walks down landing on the heel.
 _UP_M, _DOWN_M = (0.13, 0.17), (0.09, 0.12)

@@ -7,16 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES, Sole, ankle_height, hip_in_pelvis
 from dynakin.simulation.jets import Jet, constant, step, swift_step
 from dynakin.simulation.mechanics import Motion, SegmentMotion
 from dynakin.simulation.motions.posed import Point, foot_about, point_of, whole_motion
 from dynakin.simulation.support import Support
-
-Array = NDArray[np.float64]
 
 # Parts of a stride, from a foot's first contact on (Perry & Burnfield 2010, Gait Analysis, ch. 1 and 4).
 FLAT, HEEL_OFF, TOE_OFF = 0.15, 0.33, 0.60

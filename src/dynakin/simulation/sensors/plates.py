@@ -6,17 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynakin.arrays import cross
+from dynakin.arrays import Array, cross
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.pushes import UNLOADED_N
 from dynakin.recordings.recording import Plate
 from dynakin.simulation.bodies.body import Contact
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.streams import Streams
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from functools import cache
 from importlib import resources
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.markers import Site, hip_centres, marker_positions, misplace
@@ -162,9 +162,6 @@ def _spans(rng: np.random.Generator, time: Array, per_min: float, mean_s: float)
 def _fault(kind: str, markers: tuple[str, ...], time: Array, start: int, end: int) -> Fault:
     step = float(time[1] - time[0])
     return Fault(kind, markers, float(time[start]), float(time[end - 1]) + step)
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

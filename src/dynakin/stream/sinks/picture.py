@@ -8,8 +8,8 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.filter.step import Labelled
@@ -18,8 +18,6 @@ from dynakin.recordings.plates.pressure import pressed_at
 from dynakin.recordings.pushes import LOADED_N
 from dynakin.stream.sinks.base import LiveFrame, Started, Status
 from dynakin.tree import Tree
-
-Array = npt.NDArray[np.float64]
 
 _NAMES, _NAME = 4, 40  # of a list of names, so many are shown, and so many characters of each
 

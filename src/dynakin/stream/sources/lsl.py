@@ -12,14 +12,12 @@ import re
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pylsl
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError, StreamError
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo, Streams
 from dynakin.units import COMPONENTS, force_factor, length_factor, moment_factor
-
-Array = npt.NDArray[np.float64]
 
 _AXIS = re.compile(r"^(?P<name>.+?)[ _.:\-]?(?P<axis>[xyz])$", re.IGNORECASE)
 _LOAD = re.compile(r"^(?P<name>.+?)[ _.:\-]?(?P<axis>[fm][xyz])$", re.IGNORECASE)

@@ -11,13 +11,11 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError, StreamError
 from dynakin.recordings.pushes import LOADED_N
 from dynakin.units import length_factor
-
-Array = npt.NDArray[np.float64]
 
 FRAMES = ("plate", "lab")
 """Frames that QTM can give forces in: its "Local (force plate)" and "Lab"."""

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.recordings.formats.ground_forces import plates_from_table
 from dynakin.recordings.read import read, read_forces
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.times import step_of
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo, Streams
 

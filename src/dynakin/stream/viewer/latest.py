@@ -9,9 +9,8 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from dynakin.arrays import Array
 
 _HEAD = struct.Struct("<QQ")
 

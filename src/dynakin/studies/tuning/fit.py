@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.progress import Progress
 from dynakin.settings.effect import check_effect, without_effect
@@ -20,8 +20,6 @@ from dynakin.studies.tuning.likelihood import REACH, Likelihood
 from dynakin.studies.tuning.optimise import SETTLED, Optimum, curvature, deviations, minimise
 from dynakin.studies.tuning.score import CRITERIA, Shared
 from dynakin.studies.tuning.settings import check_setting, together, value_of
-
-Array = npt.NDArray[np.float64]
 
 # What is fitted where nothing is named, as far as the settings have it.
 USUAL = (

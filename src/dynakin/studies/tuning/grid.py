@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.progress import Progress
 from dynakin.settings.effect import check_effect
@@ -22,8 +22,6 @@ from dynakin.studies.engine.tasks import Task
 from dynakin.studies.tuning.score import CRITERIA, Shared, score_task
 from dynakin.studies.tuning.settings import check_setting
 from dynakin.units import COMPONENTS
-
-Array = npt.NDArray[np.float64]
 
 PAPER_RANGE = (1e-6, 1e6, 13)
 MOST_CELLS = 1_000_000

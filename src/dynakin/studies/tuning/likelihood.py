@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import DynakinError
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool, work
@@ -15,8 +15,6 @@ from dynakin.studies.engine.tasks import Row, Task
 from dynakin.studies.tuning.grid import mean_row
 from dynakin.studies.tuning.score import Shared, score_task
 from dynakin.studies.tuning.settings import together, value_of
-
-Array = npt.NDArray[np.float64]
 
 DECADE = float(np.log(10.0))
 REACH = 3.0 * DECADE

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 
-Array = npt.NDArray[np.float64]
+from dynakin.arrays import Array
+
 Costs = Callable[[Sequence[Array]], Array]
 
 STEP = 0.02

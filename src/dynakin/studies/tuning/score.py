@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.augment import extended
 from dynakin.filter.core_filter import core_filter
@@ -16,8 +16,6 @@ from dynakin.filter.noise import marker_variance, wrench_covariance
 from dynakin.settings.noise import Noise
 from dynakin.studies.tuning.trial import TuningTrial, undoubting
 from dynakin.units import COMPONENTS
-
-Array = npt.NDArray[np.float64]
 
 LOST_M = 0.5
 """Markers this far from their estimates (RMS over a frame's markers, ten frames in a row) belong to another person."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.filter.alignment import run_in_step
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.measurements import Measurements
@@ -18,8 +18,6 @@ from dynakin.results.records import FOLLOWING, REFUSED
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.studies.engine.journal import digest
-
-Array = npt.NDArray[np.float64]
 
 HORIZON_S = 0.1
 

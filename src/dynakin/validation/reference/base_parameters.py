@@ -10,12 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
+from dynakin.arrays import Array
 from dynakin.validation.reference.condensed import Condensed
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,16 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.model.inertia import RigidBody
 from dynakin.model.plan import ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.schema import Segment as SegmentEntry
 from dynakin.simulation import mechanics
-
-Array = npt.NDArray[np.float64]
 
 Tree = tuple[mechanics.Segment, ...]
 

@@ -10,21 +10,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.frames import MarkedTrial
-from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
+from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.definition import ModelDefinition
 from dynakin.model.markers.recognise import recognise
+from dynakin.model.mirroring import SIDES
 from dynakin.model.plan import ModelPlan
 from dynakin.model.schema import Frame
 from dynakin.model.schema import Segment as SegmentEntry
 from dynakin.recordings.recording import Recording
 from dynakin.validation.reference.chain import PlanarChain
-
-Array = npt.NDArray[np.float64]
 
 
 def classical_angles(chain: PlanarChain, plan: ModelPlan, landmarks: Mapping[str, Array]) -> Array:

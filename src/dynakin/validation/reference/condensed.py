@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array, Flags
 from dynakin.errors import RecordingError
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 DECLARED_SIGMA = (10.0, 20.0, 10.0)
 """fx and fy (N), mz (N m): not the plates' own noise but the size of a planar model's error on a real squat."""
@@ -36,7 +33,7 @@ class Condensed:
     names: tuple[str, ...]
     table: Array
     scale: Array
-    estimated: Mask
+    estimated: Flags
     A: Array
     b: Array
     mass_row: Array
@@ -59,7 +56,7 @@ def stacked(
     names: tuple[str, ...],
     table: Array,
     scale: Array,
-    estimated: Mask,
+    estimated: Flags,
     Y: Array,
     y: Array,
     *,

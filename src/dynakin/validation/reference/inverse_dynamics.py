@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import rms_length, wrench_about
+from dynakin.arrays import Array, rms_length, wrench_about
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.inverse_kinematics import fixed_model, inverse_kinematics
@@ -23,7 +23,6 @@ from dynakin.results.measures.sources import ABSENT, MEASURED
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 INVERSE = "IK + ID"
 """Its kind; with the cut-off its name (`inverse_name`)."""

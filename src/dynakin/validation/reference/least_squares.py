@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
+from dynakin.arrays import Array
 from dynakin.model.inertia import INERTIA_NAMES, RigidBody
 from dynakin.model.plan import ModelPlan
 from dynakin.settings.model import Bounds
@@ -26,8 +26,6 @@ from dynakin.validation.reference.regressor import (
     table_parameters,
     wrench_regressor,
 )
-
-Array = npt.NDArray[np.float64]
 
 _TO_TABLE = 1e-4
 """Pull to the table in units of each parameter's size, added to rows in sigma: decides only what no frame sees."""

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import ConfigError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition, ModelDefinition
@@ -22,7 +22,6 @@ from dynakin.validation.reference.regressor import IN_PLANE, table_dynamics
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 Lengths = Literal["constant", "frame"]
 
 

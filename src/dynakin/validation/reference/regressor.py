@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.model.inertia import RigidBody
 from dynakin.simulation import mechanics
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
-
-Array = npt.NDArray[np.float64]
 
 PLANAR_NAMES = ("mass", "mx", "my", "izz")
 

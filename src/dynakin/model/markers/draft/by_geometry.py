@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from dynakin.arrays import Array
 from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.draft.by_name import places
 
-Array = npt.NDArray[np.float64]
 Node = tuple[str, str]
 """(place, side)."""
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import Array
 from dynakin.errors import RecordingError
 from dynakin.model.markers.anatomy import anatomy
 from dynakin.model.markers.draft.by_geometry import (
@@ -31,7 +32,7 @@ from dynakin.model.markers.match import MarkerMatch, is_unlabelled
 from dynakin.recordings.frame import UPRIGHT
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, plain_name
 from dynakin.recordings.orientation import find_forward
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.recordings.vertical import find_vertical
 
