@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.axes import pulling, turned_in_words
 from dynakin.recordings.plates.loads import without_wrench
-from dynakin.recordings.plates.pressure import Surface, main_axis, plate_from_wrench
+from dynakin.recordings.plates.pressure import Surface, main_axis, main_push, plate_from_wrench
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
 from dynakin.recordings.plates.zero import Zero, zero_of
 from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
@@ -159,7 +158,7 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         notes += (note("recording", text),)
     untouched = same_times(table.time, recording.time)
     hung = [_frozen(plate, table.time) for plate in plates]
-    up = _normal(plates)
+    up = main_push(plates)
     zeros = [
         zero_of(plate.name, np.where(lost[:, None], np.nan, plate.wrench), up)
         for plate, lost in zip(plates, hung, strict=True)
@@ -287,13 +286,6 @@ def _beyond_rows(plate: Plate, covered: Flags) -> Plate:
     values = (plate.force, plate.moment, plate.cop, plate.free_moment)
     force, moment, cop, free = map(of, values)
     return replace(plate, force=force, moment=moment, cop=cop, free_moment=free)
-
-
-def _normal(plates: Sequence[Plate]) -> Array:
-    """(3,) towards the person, by what the plates carry together, as the file signs it."""
-    along = main_axis(plates)
-    carried = np.sum([np.nan_to_num(plate.force[:, along]).sum() for plate in plates])
-    return np.asarray(np.where(np.arange(3) == along, np.sign(carried), 0.0))
 
 
 def _resampled(plate: Plate, zero: Zero, table: Table, time: Array, options: ReadOptions) -> Plate:
