@@ -80,6 +80,19 @@ def test_check_refuses_as_run_does(
     assert refusal in checked
 
 
+def test_a_zero_that_nobody_stands_for_is_refused_before_the_estimate(
+    data_dir: Path, tmp_path: Path, capsys: Said, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was once the estimate was there, which took the most of the time."""
+    monkeypatch.setattr("dynakin.filter.estimator.Estimator.follow", None)
+    arguments = [str(data_dir / "plugin_gait" / "GaitNormal_1.c3d"), "--zero", "standing"]
+    assert main(["check", *arguments]) == 1
+    _, checked = printed(capsys)
+    assert "nobody stands still for 0.5 s" in checked and "(--static)" in checked
+    assert ran(arguments, tmp_path / "out") == 2
+    assert printed(capsys)[1] == checked
+
+
 def test_where_only_the_mass_is_missing_all_else_is_said(data_dir: Path, capsys: Said) -> None:
     """A chair bears part of the person, so that the plates weigh nobody."""
     folder = data_dir / "opencap_subject4"

@@ -42,6 +42,16 @@ def run(source: object, **options: object) -> tuple[list[LiveFrame], list[str], 
     return frames, said, live
 
 
+def test_a_recording_is_not_waited_for_as_a_person_is() -> None:
+    """The source says that it is one: 20 s were waited for, and the streams ended before. What is given wins."""
+    moves = simulate_squat(seed=1, duration_s=12.0).recording.window(3.0, 10.5)
+    frames, said, live = run(Replay(moves, speed=0.0))
+    assert (live.standing_s, live.standing_wait_s) == (2.0, 3.0) and "Nobody stood still for 2 s." in said
+    assert len(frames) > 300
+    with pytest.raises(StreamError, match=r"7\.5 s came, expected 2 s of standing, or 20 s in all.*standing_wait_s"):
+        run(Replay(moves, speed=0.0), standing_wait_s=20.0)
+
+
 def test_live_equals_offline_on_the_same_samples(squat: Recording) -> None:
     frames, said, _ = run(Replay(squat, speed=0.0))
     assert "Ready: move." in said and any(text.startswith("Stand still") for text in said)

@@ -38,6 +38,7 @@ class Streams:
         notes: sentences for the user.
         paced: whether samples come when they are measured; False: as fast as they are read.
         subject: "mass_kg" and "height_m" where the source gives them.
+        length_s: of a recording, which follows no request to stand still; inf: somebody is measured now.
     """
 
     markers: StreamInfo | None = None
@@ -45,6 +46,7 @@ class Streams:
     notes: tuple[str, ...] = ()
     subject: Mapping[str, float] = field(default_factory=dict)
     paced: bool = True
+    length_s: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)

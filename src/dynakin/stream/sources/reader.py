@@ -70,6 +70,7 @@ class Reader:
             notes,
             subject,
             all(streams.paced for streams in described),
+            min(streams.length_s for streams in described),
         )
 
     def get(self, timeout_s: float) -> Packet | Notice | None:

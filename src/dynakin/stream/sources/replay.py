@@ -68,6 +68,7 @@ class Replay:
             tuple(map(str, recording.notes)),
             recording.subject,
             paced=self.speed > 0.0,
+            length_s=float(recording.time[-1] - recording.time[0]),
         )
 
     def read(self, timeout_s: float) -> list[Packet] | None:

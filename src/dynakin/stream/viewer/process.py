@@ -178,7 +178,7 @@ class Page:
     def _show_status(self, status: dict[str, Any]) -> None:
         rows = [
             ("Rate", f"{status['rate_hz']:.0f} Hz, latency {status['latency_ms']:.1f} ms"),
-            ("Fit (NIS, near 1)", f"{status['nis']:.2f}, {status['tracking']}"),
+            ("Fit (NIS; 1: noise as declared)", f"{status['nis']:.2f}, {status['tracking']}"),
             ("Plates", status["plates"]),
             ("Moment", f"{self.chosen.value}: {self._source()}"),
             ("Markers", f"{status['missing']['count']} missing, refused: {in_words(status['refused'])}"),
