@@ -23,7 +23,7 @@ from dynakin.stream.monitor import Monitor
 from dynakin.stream.plates import LivePlates
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
 from dynakin.stream.sinks.group import SinkGroup
-from dynakin.stream.sources.packets import Source
+from dynakin.stream.sources.packets import Seam, Source
 from dynakin.stream.sources.reader import Notice, Reader
 from dynakin.stream.start import begin, check_labels, quietest, recording_of, stands, unknown_mass
 
@@ -219,7 +219,10 @@ class Live:
             if packet.fatal is not None:
                 raise packet.fatal
         elif packet is not None:
-            self.sinks.packet(packet)
+            if isinstance(packet, Seam):
+                self._begins_again(packet)
+            else:
+                self.sinks.packet(packet)
             self.fusion.push(packet)
         self._take(now)
         if now - self._asked > _ASK_S:
@@ -230,6 +233,11 @@ class Live:
             if self._monitor is not None and self._running and not self._reader.over:
                 for text in self._monitor.changes(self.fusion, now):
                     self.say(text)
+
+    def _begins_again(self, seam: Seam) -> None:
+        self.say("The recording begins again.")
+        if self._monitor is not None:
+            self._monitor.begins_again(seam.time_s)
 
     def _take(self, now_s: float) -> None:
         for came in self.fusion.poll(now_s):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -79,6 +79,19 @@ class PlatePacket:
     arrived_s: float = field(default=np.nan)
 
 
+@dataclass(frozen=True, eq=False)
+class Seam:
+    """A recording has ended and begins again: what lies between was never sent, so that none of it is lost.
+
+    Attributes:
+        time_s: s, by the markers' clock, of the next frame.
+        arrived_s: as of markers.
+    """
+
+    time_s: float
+    arrived_s: float = field(default=np.nan)
+
+
 Packet = MarkerPacket | PlatePacket
 
 
@@ -93,7 +106,7 @@ class Source(Protocol):
         """
         ...
 
-    def read(self, timeout_s: float) -> list[Packet] | None:
+    def read(self, timeout_s: float) -> Sequence[Packet | Seam] | None:
         """What has come since the last call, after at most ``timeout_s``; None: it is over for good.
 
         Raises:
