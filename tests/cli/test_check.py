@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from dynakin.cli.app import main
-from dynakin.cli.check_rows import _time
+from dynakin.cli.check_rows import _time, recording_rows
 from dynakin.cli.prepared import changed, short
 from dynakin.filter.prepared import Prepared
 from dynakin.messages import note, warning
@@ -80,6 +80,19 @@ def test_check_refuses_as_run_does(
     assert refusal in checked
 
 
+def test_a_zero_that_nobody_stands_for_is_refused_before_the_estimate(
+    data_dir: Path, tmp_path: Path, capsys: Said, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was once the estimate was there, which took the most of the time."""
+    monkeypatch.setattr("dynakin.filter.estimator.Estimator.follow", None)
+    arguments = [str(data_dir / "plugin_gait" / "GaitNormal_1.c3d"), "--zero", "standing"]
+    assert main(["check", *arguments]) == 1
+    _, checked = printed(capsys)
+    assert "nobody stands still for 0.5 s" in checked and "(--static)" in checked
+    assert ran(arguments, tmp_path / "out") == 2
+    assert printed(capsys)[1] == checked
+
+
 def test_where_only_the_mass_is_missing_all_else_is_said(data_dir: Path, capsys: Said) -> None:
     """A chair bears part of the person, so that the plates weigh nobody."""
     folder = data_dir / "opencap_subject4"
@@ -105,6 +118,24 @@ def test_check_promises_what_run_keeps(data_dir: Path, tmp_path: Path, capsys: S
         assert words in first and words in found
     assert "right: plate 4 0.33 to 1.03 s; plate 2 1.35 to 2.12 s; off the plates 2.42 to 2.68 s." in found
     assert "--static Static_trial.c3d (found next to the recording)" in found
+
+
+def test_a_standing_trial_of_another_person_is_among_the_doubts(data_dir: Path, capsys: Said) -> None:
+    trial, static = data_dir / "plugin_gait" / "GaitNormal_1.c3d", data_dir / "pycgm" / "Static_trial.c3d"
+    assert main(["check", str(trial), "--static", str(static)]) == 0
+    found, _ = printed(capsys)
+    assert found.count("another person, or markers put on anew") == 1
+    assert found.index("Doubts") < found.index("another person, or markers put on anew")
+
+
+def test_what_pulls_is_no_load() -> None:
+    made = standing(70.0)
+    plate = made.plates[0]
+    pulls = replace(plate, name="plate 9", force=np.tile([0.0, -40.0, 0.0], (made.n_frames, 1)))
+    said = recording_rows(made.with_plates((plate, pulls)))
+    rows = dict(str(text).split(": ", 1) for topic, text in said if topic == "Plates")
+    assert rows["plate 9"] == "up to -40 N, mean -40.0 N, loaded 0 %."
+    assert rows[plate.name].endswith("loaded 100 %.")
 
 
 def test_forces_next_to_a_recording_are_named_and_do_what_is_said(tmp_path: Path, capsys: Said) -> None:

@@ -193,19 +193,36 @@ def test_higher_rates_are_resampled(tmp_path: Path, rate: float) -> None:
     assert any("brought to" in note for note in map(str, recording.notes))
 
 
-@pytest.mark.parametrize(("offset_n", "kept_n"), [(-12.0, -12.0), (8.0, 8.0), (-2.0, 0.0)])
-def test_what_a_plate_reads_while_empty_is_left_to_the_markers(tmp_path: Path, offset_n: float, kept_n: float) -> None:
-    """It was 0 there, and was under a foot as well; noise is none."""
-    time = np.arange(-0.2, 1.3, 1e-3)
+@pytest.mark.parametrize("rate", [1000.0, 100.0])
+@pytest.mark.parametrize(
+    ("offset_n", "empty_n", "loaded_n"),
+    [(-25.0, 0.0, 700.0), (-6.0, 0.0, 700.0), (8.0, 8.0, 708.0), (-2.0, 0.0, 698.0)],
+)
+@pytest.mark.parametrize("blanked", [False, True])
+def test_what_a_plate_reads_while_empty_is_taken_off_or_left_to_the_markers(
+    tmp_path: Path, rate: float, offset_n: float, empty_n: float, loaded_n: float, blanked: bool
+) -> None:
+    """Steadily below nothing is no load, as of a C3D's plate; above, markers know whose it is; noise is none."""
+    time = np.arange(round(-0.2 * rate), round(1.3 * rate)) / rate
     noise = np.random.default_rng(1).normal(0.0, 0.5, len(time))
-    push = np.where((time > 0.3) & (time < 0.8), 700.0, 0.0) + offset_n + noise
-    of_one = QUANTITIES | {"vx": 0.0, "vy": push, "vz": 0.0, "px": 0.2 + 1e-3 * noise, "pz": 0.3 + 0.1 * time}
-    columns = {f"FP1_{key}": value for key, value in of_one.items()}  # that never change would be dead
-    columns |= {"FP1_mx": 0.0, "FP1_my": 0.0, "FP1_mz": 0.0}
+    stands = (time > 0.3) & (time < 0.8)
+    push = np.where(stands, 700.0, 0.0) + offset_n + noise
+    points = {"px": 2.2 + 1e-3 * noise, "py": 0.0, "pz": 3.3 + 0.01 * time}
+    if blanked:  # 0 where nobody stands, far from the plate
+        points = {axis: np.where(stands, values, 0.0) for axis, values in points.items()}
+    of_one = {"vx": 0.0, "vy": push, "vz": 0.0, "mx": 0.0, "my": 0.0, "mz": 0.0} | points
+    columns = {f"FP1_{key}": value for key, value in of_one.items()}
     recording = read(trc(tmp_path, 101), write(tmp_path, "a.mot", grf_text(time, columns)))
-    push = recording.plates[0].force[:, 1]
-    assert np.median(push[recording.time < 0.2]) == pytest.approx(kept_n, abs=0.5)
-    assert np.median(push[np.abs(recording.time - 0.55) < 0.1]) == pytest.approx(700.0 + offset_n, abs=0.5)
+    (plate,) = recording.plates
+    empty, loaded = recording.time < 0.2, np.abs(recording.time - 0.55) < 0.1
+    if not (rate == 100.0 and offset_n == -2.0):  # at the markers' times as it is
+        assert np.median(plate.force[empty, 1]) == pytest.approx(empty_n, abs=0.5)
+    assert np.median(plate.force[loaded, 1]) == pytest.approx(loaded_n, abs=0.5)
+    np.testing.assert_allclose(np.median(plate.cop[loaded], axis=0), [2.2, 0.0, 3.3], atol=0.01)
+    said = [str(said) for said in recording.notes if "nobody stands on it" in str(said)]
+    words = {-25.0: "Warning: plate 1 reads -2", -6.0: "plate 1 reads -", 8.0: "plate 1 reads "}
+    assert len(said) == (offset_n in words) and all(text.startswith(words[offset_n]) for text in said)
+    assert all(("taken off over the whole trial" in text) == (offset_n < 0.0) for text in said)
 
 
 def test_longer_table_at_the_same_rate_is_cut_exactly(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import xarray as xr
 import dynakin
 from dynakin.errors import LostError
 from dynakin.filter.estimator import Estimator
+from dynakin.messages import warning
 from dynakin.model.definition import load_model
 from dynakin.pipeline.result import Result
 from dynakin.recordings.formats.mot import read_table
@@ -110,6 +111,18 @@ def test_what_keeps_the_good_frames_is_said_where_it_is_and_where_there_are_any(
         refuse_lost(estimate)
     with pytest.raises(LostError, match=r"at most; no frame is good, nothing is saved\. Look"):
         refuse_lost(without_lost(arm_off(slice(None))), "--keep-lost")
+
+
+def test_a_lost_trial_says_what_was_doubted_of_it_before() -> None:
+    """Of a standing trial of somebody else, say, and not only that labels may be swapped."""
+    estimate = without_lost(arm_off(slice(300, 500)))
+    other = warning("calibration", "distances differ by 23 mm from those in other. Lengths are other's.")
+    doubted = replace(estimate, messages=[*estimate.messages, other, warning("mass", "something else.")])
+    expected = r"at most\. What was doubted before: distances differ by 23 mm .* Lengths are other's; nothing is saved"
+    with pytest.raises(LostError, match=expected) as error:
+        refuse_lost(doubted)
+    assert "something else" not in str(error.value)
+    assert "doubted" not in (why_lost(estimate) or "")
 
 
 @pytest.fixture(scope="module")

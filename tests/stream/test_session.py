@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from dynakin.stream.plates import LivePlates
 from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
 from dynakin.stream.sinks.recorder import Recorder, recorded
-from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, Streams
+from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, Seam, Streams
 from dynakin.stream.sources.replay import Replay
 from dynakin.stream.start import quietest
 from support.squat_estimator import estimator
@@ -40,6 +40,45 @@ def run(source: object, **options: object) -> tuple[list[LiveFrame], list[str], 
     live = Live(estimator(), [source], [Callback(frames.append)], say=said.append, **options)  # type: ignore[list-item,arg-type]
     live.run()
     return frames, said, live
+
+
+def test_a_recording_is_not_waited_for_as_a_person_is() -> None:
+    """The source says that it is one: 20 s were waited for, and the streams ended before. What is given wins."""
+    moves = simulate_squat(seed=1, duration_s=12.0).recording.window(3.0, 10.5)
+    frames, said, live = run(Replay(moves, speed=0.0))
+    assert (live.standing_s, live.standing_wait_s) == (2.0, 3.0) and "Nobody stood still for 2 s." in said
+    assert len(frames) > 300
+    with pytest.raises(StreamError, match=r"7\.5 s came, expected 2 s of standing, or 20 s in all.*standing_wait_s"):
+        run(Replay(moves, speed=0.0), standing_wait_s=20.0)
+
+
+def test_a_recording_that_begins_again_loses_nothing(squat: Recording) -> None:
+    """At each seam markers fell silent, the motion was lost and found, and 198 packets were lost."""
+    short = squat.window(0.0, 2.5)
+    frames, said, live = run(Replay(short, speed=2.0, loop=True, duration_s=9.0), standing_wait_s=1.0)
+    assert said.count("The recording begins again.") == 2
+    assert not [text for text in said if "silent" in text or "lost" in text or "found again" in text]
+    assert live.status.lost == live.status.late == 0 and live.status.tracking == "following"
+    assert len({round(frame.estimate.time_s // 3.5) for frame in frames}) == 3
+
+
+class UnseenAgain(Replay):
+    """In whose second round no marker is seen for 2 s."""
+
+    def read(self, timeout_s: float) -> Sequence[Packet | Seam] | None:
+        packets = super().read(timeout_s)
+        return packets and [
+            replace(packet, positions=np.full_like(packet.positions, np.nan))
+            if isinstance(packet, MarkerPacket) and 5.0 < packet.time_s < 7.0
+            else packet
+            for packet in packets
+        ]
+
+
+def test_a_loss_right_after_a_seam_is_still_said(squat: Recording) -> None:
+    said = run(UnseenAgain(squat.window(0.0, 4.0), speed=0.0, loop=True, duration_s=8.0), standing_wait_s=1.0)[1]
+    after = said[said.index("The recording begins again.") :]
+    assert any(text.startswith("The motion is lost at 6.0") for text in after)
 
 
 def test_live_equals_offline_on_the_same_samples(squat: Recording) -> None:

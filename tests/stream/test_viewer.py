@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import multiprocessing
 import socket
 import time
 import urllib.error
@@ -36,6 +37,33 @@ def test_the_reader_gets_the_newest_once() -> None:
     assert reader.read() is None
     reader.close()
     writer.close()
+
+
+def hammered(path: str) -> None:
+    """Writes as fast as it can for a second."""
+    writer, until, k = Latest(200, path=path), time.monotonic() + 1.0, 0
+    while time.monotonic() < until:
+        k += 1
+        writer.write(np.full(200, float(k)), json.dumps({"a": "x" * (k % 600)}).encode())
+
+
+def test_a_reader_never_sees_half_of_what_is_written() -> None:
+    """The page died of it within minutes: a counter that is 0 for an instant passed as even."""
+    mine = Latest(200)
+    reader = Latest(200, path=mine.path)
+    writing = multiprocessing.get_context("spawn").Process(target=hammered, args=(mine.path,))
+    writing.start()
+    reads = 0
+    try:
+        while writing.is_alive():
+            if (found := reader.read()) is not None:
+                reads += 1
+                assert (found[0] == found[0][0]).all() and set(json.loads(found[1])) == {"a"}
+    finally:
+        writing.join()
+        reader.close()
+        mine.close()
+    assert reads > 5 and writing.exitcode == 0
 
 
 def test_an_arrow_stands_where_the_wrench_acts() -> None:
@@ -97,6 +125,24 @@ def test_the_page_is_served_to_this_machine_and_ends_with_the_session(
     live = session(squat, [viewer])
     live.run()
     assert viewer._process.poll() == 0  # it ended by itself and without an error
+
+
+def test_that_the_page_is_gone_is_said_once_and_the_session_goes_on(squat: Recording) -> None:
+    pytest.importorskip("viser")
+    from dynakin.stream.viewer.sink import Viewer
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    viewer, said, frames = Viewer(port=port), list[str](), list[LiveFrame]()
+    live = session(squat, [viewer, Callback(frames.append)])
+    live._say = said.append
+    viewer._process.kill()
+    viewer._process.wait(10.0)
+    live.run()
+    (gone,) = (text for text in said if "is gone" in text)
+    assert "its process ended with -9" in gone and "goes on without it" in gone
+    assert live.failures == [gone] and len(frames) > 100
 
 
 def connects(url: str, origin: str | None, host: str | None = None) -> bool:

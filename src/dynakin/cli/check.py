@@ -14,7 +14,7 @@ from dynakin.files import is_file
 from dynakin.progress import stage
 
 
-@with_settings("forces", *OF_A_MODEL, "parameters", *OF_THE_LABORATORY, *OF_THE_PLATES, "preset")
+@with_settings("forces", *OF_A_MODEL, "parameters", *OF_THE_LABORATORY, *OF_THE_PLATES, "preset", "zero")
 def check(
     trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
     *,

@@ -13,6 +13,7 @@ from dynakin.messages import Message, about, notes_of, warnings_of
 from dynakin.model.markers.fit import fits
 from dynakin.pipeline.stages import prepare_case
 from dynakin.recordings.companions import companion_forces, companion_static
+from dynakin.recordings.plates.pressure import main_push
 from dynakin.recordings.pushes import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import plural, sentence, words
@@ -64,12 +65,12 @@ def recording_rows(recording: Recording) -> Rows:
         kinds = list(dict.fromkeys(f"{event.side} {event.label}".strip().casefold() for event in recording.events))
         rows.append(("In the file", f"{plural(len(recording.events), 'event')} ({', '.join(kinds)})."))
     for plate in recording.plates:
-        size = np.linalg.norm(plate.force, axis=1)
-        if not np.isfinite(size).any():
+        push = plate.force @ main_push(recording.plates)
+        if not np.isfinite(push).any():
             rows.append(("Plates", f"{plate.name}: not measured."))
             continue
-        loaded = 100.0 * float(np.mean(np.nan_to_num(size) > LOADED_N))
-        text = f"{plate.name}: up to {np.nanmax(size):.0f} N, mean {np.nanmean(size):.1f} N, loaded {loaded:.0f} %."
+        loaded = 100.0 * float(np.mean(np.nan_to_num(push) > LOADED_N))
+        text = f"{plate.name}: up to {np.nanmax(push):.0f} N, mean {np.nanmean(push):.1f} N, loaded {loaded:.0f} %."
         rows.append(("Plates", text))
     return [*rows, *(("Note", short(message)) for message in recording.notes)]
 
@@ -94,7 +95,8 @@ def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None
     calibrated = ready.calibrated
     said = calibrated.messages
     subject = about(said, "mass", "height", "sex")
-    elsewhere = {*about(said, "marker set", "ground", "details"), *subject}  # a run's report has the details
+    doubted = [] if refusal is not None else warnings_of(about(said, "calibration", "labels"))
+    elsewhere = {*about(said, "marker set", "ground", "details"), *subject, *doubted}  # a run's report has the details
     more: dict[str, list[str | Message]] = {
         "Model": [*_held(ready)],
         "Markers": [
@@ -113,7 +115,7 @@ def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None
     if refusal is not None:
         return rows
     figures = ready.moment_figures()
-    doubts = [message for message in warnings_of(ready.messages) if message not in said]
+    doubts = [message for message in warnings_of(ready.messages) if message not in said or message in doubted]
     there = [sentence(message.text) for message in doubts]  # with what to do
     rows += [("Results", text) for text in (figures["verdict"], *figures["reasons"]) if text not in there]
     rows += [("Results", message.text) for message in notes_of(about(ready.messages, "carried"))]

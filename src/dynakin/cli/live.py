@@ -28,11 +28,8 @@ if TYPE_CHECKING:
     from dynakin.stream.sinks.base import Sink
     from dynakin.stream.sources.replay import Replay
 
-# Seconds of standing that are asked for, and how long they are waited for.
-_LIVE_STANDING_S, _REPLAY_STANDING_S = (2.0, 20.0), (2.0, 3.0)
 _FILES = frozenset({"model", "markers", "table", "preset", "static", "parameters"})
 _HOST, _PORT = "127.0.0.1", 8080
-_SHORT_S, _SHORT_STANDING_S = 6.0, 0.4
 
 
 @with_settings(
@@ -130,9 +127,8 @@ def live(
     static = given.get("static")
     settings = {"model": Settings().model} | given  # which is to stand in what is recorded
     sources = _sources(source, forces)
-    standing, wait = _LIVE_STANDING_S
-    if isinstance(sources[0], Replay):
-        standing, wait = _for_replay(sources[0], source, view and record is None)
+    if isinstance(sources[0], Replay) and view and record is None:
+        _play_again(sources[0], source)
     sinks = _sinks(settings, record, publish, view, host, port)
     try:
         with stage("starting"):
@@ -142,8 +138,7 @@ def live(
                 sinks,
                 lag_s=lag,
                 delay_s=delay,
-                standing_s=standing,
-                standing_wait_s=wait if standing_wait is None else standing_wait,
+                standing_wait_s=standing_wait,
                 static=None if static is None else read(static),
                 known=None if known is None else _estimated(known),
                 record=lambda: Recorder(Path(f"live-{datetime.now():%Y%m%d-%H%M%S}"), settings),
@@ -177,16 +172,11 @@ def _estimated(parameters: Path) -> dict[str, tuple[float, float]]:
     }
 
 
-def _for_replay(replay: Replay, address: str, again: bool) -> tuple[float, float]:
-    """Seconds of standing and of waiting for them: a recording does not follow requests. One that is watched is
-    played again and again, so that the page stays."""
-    if again and "loop" not in address and not replay.loop:
+def _play_again(replay: Replay, address: str) -> None:
+    """A recording that is watched is played again and again, so that the page stays."""
+    if "loop" not in address and not replay.loop:
         replay.loop = True
         out().print("Played again and again until Ctrl-C (loop=no: once).")
-    length = replay.recording.time[-1] - replay.recording.time[0]
-    if length >= _SHORT_S:
-        return _REPLAY_STANDING_S
-    return _SHORT_STANDING_S, max(_SHORT_STANDING_S, 0.5 * length)
 
 
 def _sources(source: str, forces: str | None) -> list[Any]:

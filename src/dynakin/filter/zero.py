@@ -55,6 +55,19 @@ def standing_zero(estimator: Estimator, estimate: Estimate, static: Recording | 
         RecordingError: nobody stands still for half a second. ModelError: the standing trial does not fit the model.
     """
     standing = estimate.recording if static is None else static
+    window = zero_window(standing)
+    if static is None and estimate.smoothed:
+        coordinates = estimate.values("coordinates")[window]
+        return mean_angles(estimate.coordinate_names, estimate.is_rotation(), coordinates)
+    return _estimated_anew(estimator, estimate, standing, window)
+
+
+def zero_window(standing: Recording) -> slice:
+    """Frames of a recording that the zero is taken from.
+
+    Raises:
+        RecordingError: nobody stands still for half a second.
+    """
     window = standing_window(standing)
     if window is None:
         raise RecordingError(
@@ -62,10 +75,7 @@ def standing_zero(estimator: Estimator, estimate: Estimate, static: Recording | 
             "(zero = 'standing'), there or in a trial of its own (--static)",
             asks_for="static",
         )
-    if static is None and estimate.smoothed:
-        coordinates = estimate.values("coordinates")[window]
-        return mean_angles(estimate.coordinate_names, estimate.is_rotation(), coordinates)
-    return _estimated_anew(estimator, estimate, standing, window)
+    return window
 
 
 def _estimated_anew(estimator: Estimator, estimate: Estimate, standing: Recording, window: slice) -> dict[str, float]:

@@ -13,6 +13,7 @@ from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
+from dynakin.filter.zero import zero_window
 from dynakin.messages import note
 from dynakin.progress import Progress, stage
 from dynakin.recordings.recording import Recording
@@ -131,6 +132,8 @@ def prepare_case(case: Case) -> dict[str, Prepared]:
         DynakinError: as `run`, for all that can be known before the estimate.
     """
     setup = case.setup
+    if setup.zero == "standing":
+        zero_window(case.static or case.recording)
     return {
         title: setup.estimator(title).prepare(case.recording, static=case.static, lag_s=setup.lag_s)
         for title in setup.noise

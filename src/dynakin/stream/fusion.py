@@ -16,7 +16,7 @@ from dynakin.settings.defaults import DELAY_S
 from dynakin.stream.plate_samples import PlateSamples
 from dynakin.stream.sources.clock import Clock, offset_between
 from dynakin.stream.sources.in_order import Counts, InOrder
-from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
+from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, Seam, StreamInfo
 
 SILENT_S = 0.25
 """A stream from which nothing has come for so long is silent: nobody waits for it."""
@@ -75,6 +75,7 @@ class Fusion:
         self._head: tuple[float, MarkerPacket] | None = None
         self._marker_arrived = self._plate_arrived = -np.inf
         self._last_s: float | None = None
+        self._at_seam = False
         self.plates_behind_s = 0.0
         """By how much the plates lag behind the markers: what they say so much later is of a frame."""
 
@@ -112,15 +113,18 @@ class Fusion:
 
     def markers_silent(self, now_s: float) -> bool:
         """Whether nothing comes from the markers."""
-        return now_s - self._marker_arrived > max(SILENT_S, 3.0 * self.period_s)
+        return not self._at_seam and now_s - self._marker_arrived > max(SILENT_S, 3.0 * self.period_s)
 
     def plates_silent(self, now_s: float) -> bool:
         """Whether plates were declared and nothing comes from them."""
-        return self.plates is not None and now_s - self._plate_arrived > SILENT_S
+        return self.plates is not None and not self._at_seam and now_s - self._plate_arrived > SILENT_S
 
-    def push(self, packet: Packet) -> None:
+    def push(self, packet: Packet | Seam) -> None:
         """Take a packet, as it arrived."""
-        if isinstance(packet, MarkerPacket):
+        if isinstance(packet, Seam):
+            self._push_seam(packet)
+        elif isinstance(packet, MarkerPacket):
+            self._at_seam = False
             self._push_markers(packet)
         elif self.plates is not None:
             self._push_plates(packet)
@@ -139,6 +143,13 @@ class Fusion:
         seen &= packet.positions.any(axis=1, keepdims=True)
         positions = np.where(seen, packet.positions, np.nan)  # infinite or 0, 0, 0: some systems' words for missing
         self._frames.push(time, time, packet.arrived_s, MarkerPacket(time, positions, packet.arrived_s))
+
+    def _push_seam(self, packet: Seam) -> None:
+        self._at_seam = True
+        time = packet.time_s + self._clocks[self.markers.clock].offset_s
+        self._frames.seam(time)
+        if self._blocks is not None and self.plates is not None and self.plates.clock == self.markers.clock:
+            self._blocks.seam(time)
 
     def _push_plates(self, packet: PlatePacket) -> None:
         assert self.plates is not None and self._blocks is not None

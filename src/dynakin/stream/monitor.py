@@ -51,6 +51,7 @@ class Monitor:
         self.stepped_s = -np.inf  # time of the last step
         self._followed_s = np.nan  # time of the last step with markers that fitted
         self._lost = False
+        self._expected_until_s = -np.inf
 
     def status(
         self,
@@ -103,9 +104,12 @@ class Monitor:
         """A sentence where the motion is lost, and where it is found again: then the markers fit."""
         word, at, before = self.last.tracking, estimate.time_s, self._followed_s
         self.steps += 1
-        self.lost_frames += word in NO_ESTIMATE
+        expected = at < self._expected_until_s
+        self.lost_frames += word in NO_ESTIMATE and not expected
         if np.isfinite(fused.positions).any() and word in ("following", "found"):
             self._followed_s = at
+        if expected and not self._lost:
+            return []
         if word in ("lost", "restarted") and not self._lost:
             self._lost = True
             return [f"The motion is lost at {at:.2f} s: it is held until the markers fit again."]
@@ -124,6 +128,10 @@ class Monitor:
         axes = np.array([self.initial.spec.markers[k].measured for k in used])
         off = np.where(axes, self.initial.ground.points_to_ground(measured) - estimate.markers[used], 0.0)
         return float(rms_length(off))
+
+    def begins_again(self, time_s: float) -> None:
+        """A recording does, at this time: that the motion is lost there says nothing of the measurement."""
+        self._expected_until_s = time_s + _SOON_S
 
     def published(self, time_s: float, latency_s: float) -> None:
         """An estimate went out, so long after its sample had arrived."""

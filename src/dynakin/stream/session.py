@@ -23,7 +23,7 @@ from dynakin.stream.monitor import Monitor
 from dynakin.stream.plates import LivePlates
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
 from dynakin.stream.sinks.group import SinkGroup
-from dynakin.stream.sources.packets import Source
+from dynakin.stream.sources.packets import Seam, Source
 from dynakin.stream.sources.reader import Notice, Reader
 from dynakin.stream.start import begin, check_labels, quietest, recording_of, stands, unknown_mass
 
@@ -32,6 +32,8 @@ _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is
 _DEVIATIONS_S, _DELAYED_DEVIATIONS_S = 0.2, 1.0  # those of a lag take 0.6 steps for each of its frames
 _SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
 _CATCH_UP_S = 1.0  # with what came while the model was measured: that is left out too, but is no sign of slowness
+_STANDING_S, _REPLAY_STANDING_S = (2.0, 20.0), (2.0, 3.0)  # that are asked for, and how long they are waited for
+_SHORT_S, _SHORT_STANDING_S = 6.0, 0.4  # a recording
 _MASS_KG = 70.0  # of a person of whom nothing is known, so that at least the movement is seen
 
 
@@ -44,8 +46,9 @@ class Live:
         lag_s: by how much the estimates are late, so that the frames until then help to make them; None: the
             recommended `LIVE_LAG_S`, or 0 where the noise settings have no smoother.
         delay_s: longest wait for what is missing (`Fusion`).
-        standing_s: how long the person stands still at the start.
-        standing_wait_s: after so long without, the quietest moment since then is taken.
+        standing_s: how long the person stands still at the start; None: 2 s, of a recording of less than 6 s 0.4.
+        standing_wait_s: after so long without, the quietest moment since then is taken; None: 20 s, of a recording
+            3 s, or half of it.
         max_late_s: where the estimate is further behind what arrives, frames are left out; they are counted.
         static, known: see `begin`.
         wait_s: how long to wait for the sources.
@@ -61,8 +64,8 @@ class Live:
         *,
         lag_s: float | None = None,
         delay_s: float = DELAY_S,
-        standing_s: float = 2.0,
-        standing_wait_s: float = 20.0,
+        standing_s: float | None = None,
+        standing_wait_s: float | None = None,
         static: Recording | None = None,
         known: Mapping[str, tuple[float, float]] | None = None,
         wait_s: float = 30.0,
@@ -72,7 +75,9 @@ class Live:
     ) -> None:
         self.estimator, self.sinks = estimator, SinkGroup(sinks, record, self.say)
         self.lag_s = live_lag(lag_s, estimator.noise)
-        self.delay_s, self.standing_s, self.standing_wait_s = delay_s, standing_s, standing_wait_s
+        self.delay_s = delay_s
+        self._standing_given = (standing_s, standing_wait_s)
+        self.standing_s, self.standing_wait_s = _standing(np.inf, *self._standing_given)
         self.static, self.known = static, known
         self.max_late_s = max_late_s
         self._say = say
@@ -155,7 +160,8 @@ class Live:
             if self._reader.over and self._tracker is None:
                 raise StreamError(
                     f"the streams ended before the model was measured: {self._came_s:.1f} s came, expected "
-                    f"{self.standing_s:g} s of standing"
+                    f"{self.standing_s:g} s of standing, or {self.standing_wait_s:g} s in all, after which the "
+                    "quietest moment is taken (standing_wait_s in Python, --standing-wait)"
                 )
         finally:
             if self._monitor is not None and (text := self._monitor.summary(self.fusion)):
@@ -184,6 +190,7 @@ class Live:
         self.say("Waiting for the streams.")
         streams = self._reader.open()
         markers, plates = streams.markers, streams.plates
+        self.standing_s, self.standing_wait_s = _standing(streams.length_s, *self._standing_given)
         self._fusion = Fusion(markers, plates, delay_s=self.delay_s)
         self._plates = LivePlates(self.estimator, self._fusion, self.say)
         assert markers is not None
@@ -212,7 +219,10 @@ class Live:
             if packet.fatal is not None:
                 raise packet.fatal
         elif packet is not None:
-            self.sinks.packet(packet)
+            if isinstance(packet, Seam):
+                self._begins_again(packet)
+            else:
+                self.sinks.packet(packet)
             self.fusion.push(packet)
         self._take(now)
         if now - self._asked > _ASK_S:
@@ -223,6 +233,11 @@ class Live:
             if self._monitor is not None and self._running and not self._reader.over:
                 for text in self._monitor.changes(self.fusion, now):
                     self.say(text)
+
+    def _begins_again(self, seam: Seam) -> None:
+        self.say("The recording begins again.")
+        if self._monitor is not None:
+            self._monitor.begins_again(seam.time_s)
 
     def _take(self, now_s: float) -> None:
         for came in self.fusion.poll(now_s):
@@ -379,3 +394,15 @@ class Live:
         status = Status(phase=phase) if self._monitor is None or not self._running else self._monitor.last
         self._say(text)
         self.sinks.said(text, status)
+
+
+def _standing(length_s: float, standing_s: float | None, wait_s: float | None) -> tuple[float, float]:
+    """Seconds of standing that are asked for, and of waiting for them, where they are not given.
+
+    Args:
+        length_s: of a recording, which does not follow requests; inf: of none.
+    """
+    stands, waits = _STANDING_S if length_s == np.inf else _REPLAY_STANDING_S
+    if length_s < _SHORT_S:
+        stands, waits = _SHORT_STANDING_S, max(_SHORT_STANDING_S, 0.5 * length_s)
+    return stands if standing_s is None else standing_s, waits if wait_s is None else wait_s

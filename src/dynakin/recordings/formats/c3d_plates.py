@@ -33,9 +33,10 @@ from dynakin.recordings.formats.c3d_plate_types import (
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.axes import pulling, turned_in_words
 from dynakin.recordings.plates.dead import Channels, dead_channels
-from dynakin.recordings.plates.pressure import Surface, part_pulling, plate_from_wrench, read_while_empty
+from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words
-from dynakin.recordings.pushes import JUDGED_N, LASTING_PULL, UNLOADED_N
+from dynakin.recordings.plates.zero import zero_of
+from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Plate
 from dynakin.recordings.resampling import (
     CausalLowPass,
@@ -49,9 +50,6 @@ from dynakin.recordings.resampling import (
 )
 
 _MOST_PLATES = 100
-_OFFSET_WORTH_A_NOTE_N = 5.0
-_STEADY = 0.8
-"""Part of what is read without a load that must be the same to `UNLOADED_N` for it to be the plate's zero."""
 _LEAST_SURFACE_M2 = 1e-4
 _LOOK = "look at its cable and its amplifier, and at this channel in the file"
 
@@ -144,10 +142,11 @@ def read_plates(
     notes += said
     plates = []
     for raw in (raw.without(lost) for raw, lost in zip(raws, dead, strict=True)):
-        raw, reads_n, said = _at_zero(raw)
-        notes += said
-        plate = _at_marker_times(raw, analog_time, time, options, zero_unloaded=not reads_n > 0.0)
-        plates.append(replace(plate, empty_n=min(reads_n, 0.0)))
+        zero = zero_of(raw.name, np.hstack([raw.force, raw.moment]), raw.surface.normal)
+        notes += zero.said
+        raw = replace(raw, force=raw.force - zero.wrench[:3], moment=raw.moment - zero.wrench[3:])
+        plate = _at_marker_times(raw, analog_time, time, options, zero_unloaded=not zero.reads_n > 0.0)
+        plates.append(replace(plate, empty_n=min(zero.reads_n, 0.0)))
     if per_frame > 1 and plates:
         how = "zero-phase FIR low-pass"
         if options.causal and len(time) > 1:
@@ -340,30 +339,6 @@ def _calibration(parameters: Parameters, k: int, kind: int) -> Array | None:
     elif by_row:
         matrix = matrix.T
     return np.asarray(matrix[:rows, :columns])
-
-
-def _at_zero(raw: _Raw) -> tuple[_Raw, float, list[Message]]:
-    """The plate without what it reads steadily below 0 while nobody is on it, which no load does; what it then still
-    reads, N (0: noise; above 0 markers say whether that is somebody's load); and what there is to say."""
-    push = raw.force @ raw.surface.normal
-    known, reads = np.nan_to_num(push, nan=np.inf), read_while_empty(push)
-    pulls = part_pulling(push)
-    if pulls > LASTING_PULL:
-        text = (
-            f"{raw.name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in {100.0 * pulls:.0f} % "
-            "of the recording: taken as empty there. Zero it before the trial."
-        )
-        return raw, min(reads, 0.0), [warning("plates", text)]
-    own = np.abs(known - reads) < UNLOADED_N
-    if reads < 0.0 and np.count_nonzero(own) >= _STEADY * np.count_nonzero(known < JUDGED_N):
-        force, moment = (values - np.nanmedian(values[own], axis=0) for values in (raw.force, raw.moment))
-        text = f"{raw.name} reads {reads:.3g} N where nobody stands on it: it is taken off over the whole trial."
-        said = (warning if -reads > UNLOADED_N else note)("zero", text)
-        return replace(raw, force=force, moment=moment), 0.0, [said]
-    if abs(reads) < _OFFSET_WORTH_A_NOTE_N:
-        return raw, reads, []
-    left = " (not taken off)" if reads < 0.0 else ", or by a light load"
-    return raw, reads, [note("plates", f"{raw.name} reads {reads:.3g} N where nobody stands on it{left}.")]
 
 
 def _at_marker_times(raw: _Raw, time_in: Array, time: Array, options: ReadOptions, *, zero_unloaded: bool) -> Plate:

@@ -14,9 +14,11 @@ from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns, 
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.axes import pulling, turned_in_words
-from dynakin.recordings.plates.pressure import Surface, main_axis, part_pulling, plate_from_wrench, read_while_empty
+from dynakin.recordings.plates.loads import without_wrench
+from dynakin.recordings.plates.pressure import Surface, main_axis, main_push, plate_from_wrench
 from dynakin.recordings.plates.stuck import frozen, frozen_in_words, without_frames
-from dynakin.recordings.pushes import LASTING_PULL, LOADED_N, UNLOADED_N
+from dynakin.recordings.plates.zero import Zero, zero_of
+from dynakin.recordings.pushes import JUDGED_N, UNLOADED_N
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.resampling import UNEVEN, ReadOptions, low_pass, reach_s, resample, same_times, touched
 from dynakin.recordings.times import rate_of, settled_times, spans, step_of
@@ -108,10 +110,11 @@ def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[Message]]:
 
 def _without_blanks(point: Array, force: Array) -> Array:
     """Points of application (T, 3), where a plate that is hardly loaded has none: where it was pressed last or is next,
-    as programs blank the point of a force that is too small to show it; anywhere of no force."""
-    blank = np.isnan(point).any(axis=1)
+    as programs blank the point of a force that is too small to show it, or write 0 (a plate's zero would then act at
+    the laboratory's origin); anywhere of no force."""
+    blank = np.isnan(point).any(axis=1) | (point == 0.0).all(axis=1)
     known = np.flatnonzero(~blank & (np.linalg.norm(force, axis=1) > UNLOADED_N))
-    faint = np.flatnonzero(blank & (np.linalg.norm(force, axis=1) < LOADED_N))
+    faint = np.flatnonzero(blank & (np.linalg.norm(force, axis=1) < JUDGED_N))
     found = point.copy()
     if len(known):
         after = np.clip(np.searchsorted(known, faint), 1, len(known) - 1) if len(known) > 1 else np.zeros_like(faint)
@@ -132,9 +135,10 @@ def _three(table: Table, axes: dict[str, str]) -> Array:
 def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> Recording:
     """The recording with the plates of a ground-force table, at the times of its markers.
 
-    A table at the markers' times passes through untouched (unless options ask for a filter or threshold); one
-    at a higher rate that covers the markers is resampled: the wrench about the laboratory origin, not the
-    centre of pressure, which jumps at each contact.
+    What a plate reads steadily below 0 while nobody is on it is taken off, as of a C3D's. Else a table at the markers'
+    times passes through untouched (unless options ask for a filter or threshold); one at a higher rate that covers the
+    markers is resampled: the wrench about the laboratory origin, not the centre of pressure, which jumps at each
+    contact.
 
     Frames beyond its rows are not measured (NaN).
 
@@ -152,6 +156,15 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         notes += (note("recording", text),)
     untouched = same_times(table.time, recording.time)
     hung = [_frozen(plate, table.time) for plate in plates]
+    up = main_push(plates)
+    zeros = [
+        zero_of(plate.name, np.where(lost[:, None], np.nan, plate.wrench), up)
+        for plate, lost in zip(plates, hung, strict=True)
+    ]
+    plates = tuple(
+        without_wrench(plate, zero.wrench, up) if zero.wrench.any() else plate
+        for plate, zero in zip(plates, zeros, strict=True)
+    )
     for plate, lost in zip(plates, hung, strict=True):
         notes += tuple(frozen_in_words(plate.name, table.time, lost))
     covered: Flags = np.ones(recording.n_frames, dtype=bool)
@@ -165,15 +178,18 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
             f"{recording.n_frames} marker frames ({'causal' if options.causal else 'zero-phase'} filter)."
         )
         notes += (note("routine", text),)
-    if untouched and options.plate_filter_hz is None and options.force_threshold_n is None:
+    as_it_is = untouched and options.plate_filter_hz is None and options.force_threshold_n is None
+    notes += tuple(said for zero in zeros if not (zero.pulls and as_it_is) for said in zero.said)
+    if as_it_is:
         return recording.with_plates(tuple(map(without_frames, plates, hung)), notes)
     time = recording.time[covered]
     reach = reach_s(rate_of(table.time), recording.rate, options.plate_filter_hz)
     found = [
         _beyond_rows(
-            without_frames(_resampled(plate, table, time, options), touched(lost, table.time, time, reach)), covered
+            without_frames(_resampled(plate, zero, table, time, options), touched(lost, table.time, time, reach)),
+            covered,
         )
-        for plate, lost in zip(plates, hung, strict=True)
+        for plate, zero, lost in zip(plates, zeros, hung, strict=True)
     ]
     return recording.with_plates(tuple(found), notes)
 
@@ -270,7 +286,7 @@ def _beyond_rows(plate: Plate, covered: Flags) -> Plate:
     return replace(plate, force=force, moment=moment, cop=cop, free_moment=free)
 
 
-def _resampled(plate: Plate, table: Table, time: Array, options: ReadOptions) -> Plate:
+def _resampled(plate: Plate, zero: Zero, table: Table, time: Array, options: ReadOptions) -> Plate:
     wrench = plate.wrench
     for row in np.flatnonzero(np.isnan(wrench).any(axis=1))[:1]:
         raise RecordingError(
@@ -296,14 +312,8 @@ def _resampled(plate: Plate, table: Table, time: Array, options: ReadOptions) ->
         surface,
         corners=None,
         threshold_n=threshold,
-        zero_unloaded=options.force_threshold_n is not None or not _has_an_offset(wrench[:, :3] @ surface.normal),
+        zero_unloaded=options.force_threshold_n is not None or not zero.reads_n or zero.pulls,
     )
-
-
-def _has_an_offset(push: Array) -> bool:
-    """Whether markers are to say if what a plate reads while it is empty is a light load, or under a foot as well; of a
-    plate that pulls more than an offset does nobody knows."""
-    return bool(read_while_empty(push)) and not part_pulling(push) > LASTING_PULL
 
 
 def _surface(plate: Plate) -> Surface | None:

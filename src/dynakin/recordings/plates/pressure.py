@@ -3,7 +3,7 @@ wrench presses on a level plane."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,13 @@ class Surface:
 def main_axis(plates: Iterable[Plate]) -> int:
     """Axis of the laboratory along which plates carry the most: the vertical one, where nobody says which that is."""
     return int(np.argmax(np.sum([np.abs(np.nan_to_num(plate.force)).sum(axis=0) for plate in plates], axis=0)))
+
+
+def main_push(plates: Sequence[Plate]) -> Array:
+    """(3,) the way that plates push together along that axis: up, by forces as the file signs them."""
+    along = main_axis(plates)
+    together = sum(float(np.nan_to_num(plate.force[:, along]).sum()) for plate in plates)
+    return np.asarray(np.where(np.arange(3) == along, np.sign(together), 0.0))
 
 
 def centre_of_pressure(force: Array, moment: Array, surface: Surface, threshold_n: float) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynakin.arrays import Array, Flags, rms, runs
 from dynakin.errors import LostError
-from dynakin.messages import warning
+from dynakin.messages import about, warning, warnings_of
 from dynakin.recordings.times import spans
 from dynakin.results.estimate import AXES, Estimate, values_of
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
@@ -123,17 +123,21 @@ def lost_in_words(estimate: Estimate) -> str:
 
 
 def why_lost(estimate: Estimate) -> str | None:
-    """Why a trial as a whole is no estimate; None where it is one."""
+    """Why a trial as a whole is no estimate, with what was doubted of the person and the labels before, which is often
+    the cause; None where it is one."""
     found = estimate.tracking
     if found is None:
         return None
     share = lost_share(found)
     if share <= MOST_LOST:
         return None
-    return (
+    doubted = warnings_of(about(estimate.messages, "calibration", "labels"))
+    text = (
         f"{in_words(estimate, found)[:-1]}. That is {100.0 * share:.0f} % of the frames with markers, expected "
         f"{100.0 * MOST_LOST:.0f} % at most"
     )
+    before = "; ".join(message.text.removesuffix(".") for message in doubted)
+    return f"{text}. What was doubted before: {before}" if before else text
 
 
 def refuse_lost(estimate: Estimate, keep: str | None = None) -> None:

@@ -45,6 +45,7 @@ class InOrder(Generic[T]):
         self._heap: list[tuple[float, int, float, float, T, int]] = []
         self._pushed = 0
         self._newest = -np.inf
+        self._seam_s = np.inf
 
     def push(self, start_s: float, end_s: float, arrived_s: float, item: T, count: int = 1) -> None:
         """A packet with ``count`` samples; left out where it is too late or there already."""
@@ -75,6 +76,9 @@ class InOrder(Generic[T]):
             if not due:
                 return None
             heapq.heappop(self._heap)
+            if end > self._seam_s:
+                self._seam_s = np.inf
+                self._pace.go_on_from(None)
             self.counts.lost += self._pace.missing(start, end, count)
             self.last_s = end
             return item
@@ -84,6 +88,10 @@ class InOrder(Generic[T]):
         """Take what lies before ``time_s`` as given."""
         self.last_s = time_s if self.last_s is None else max(self.last_s, time_s)
         self._pace.go_on_from(self.last_s)
+
+    def seam(self, before_s: float) -> None:
+        """Nothing was sent between what has come and ``before_s``."""
+        self._seam_s = before_s - 0.5 * self.period_s
 
     def clear(self) -> None:
         """Forget the order, keep the counts."""

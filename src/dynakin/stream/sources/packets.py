@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -37,6 +37,7 @@ class Streams:
         notes: sentences for the user.
         paced: whether samples come when they are measured; False: as fast as they are read.
         subject: "mass_kg" and "height_m" where the source gives them.
+        length_s: of a recording, which follows no request to stand still; inf: somebody is measured now.
     """
 
     markers: StreamInfo | None = None
@@ -44,6 +45,7 @@ class Streams:
     notes: tuple[str, ...] = ()
     subject: Mapping[str, float] = field(default_factory=dict)
     paced: bool = True
+    length_s: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +78,19 @@ class PlatePacket:
     arrived_s: float = field(default=np.nan)
 
 
+@dataclass(frozen=True, eq=False)
+class Seam:
+    """A recording has ended and begins again: what lies between was never sent, so that none of it is lost.
+
+    Attributes:
+        time_s: s, by the markers' clock, of the next frame.
+        arrived_s: as of markers.
+    """
+
+    time_s: float
+    arrived_s: float = field(default=np.nan)
+
+
 Packet = MarkerPacket | PlatePacket
 
 
@@ -90,7 +105,7 @@ class Source(Protocol):
         """
         ...
 
-    def read(self, timeout_s: float) -> list[Packet] | None:
+    def read(self, timeout_s: float) -> Sequence[Packet | Seam] | None:
         """What has come since the last call, after at most ``timeout_s``; None: it is over for good.
 
         Raises:

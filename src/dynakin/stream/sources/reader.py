@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from dynakin.errors import ConfigError, DynakinError, StreamError
-from dynakin.stream.sources.packets import Packet, Source, Streams
+from dynakin.stream.sources.packets import Packet, Seam, Source, Streams
 
 _READ_S = 0.02
 _AGAIN_S = 0.5
@@ -33,7 +33,7 @@ class Reader:
 
     def __init__(self, sources: Sequence[Source], wait_s: float = 30.0) -> None:
         self.sources, self.wait_s = tuple(sources), wait_s
-        self._queue: queue.SimpleQueue[Packet | Notice | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[Packet | Seam | Notice | None] = queue.SimpleQueue()
         self._stop = threading.Event()
         self._threads: list[threading.Thread] = []
         self._open = 0
@@ -70,9 +70,10 @@ class Reader:
             notes,
             subject,
             all(streams.paced for streams in described),
+            min(streams.length_s for streams in described),
         )
 
-    def get(self, timeout_s: float) -> Packet | Notice | None:
+    def get(self, timeout_s: float) -> Packet | Seam | Notice | None:
         """The next packet or notice, None where nothing came in time."""
         try:
             found = self._queue.get(timeout=timeout_s)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from dynakin.recordings.formats.ground_forces import plates_from_table
 from dynakin.recordings.read import read, read_forces
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.times import step_of
-from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo, Streams
+from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, Seam, StreamInfo, Streams
 
 _SEAM_S = 1.0  # nobody is seen between the last frame and the first: a gap, as it would be where somebody comes back
 
@@ -25,7 +26,7 @@ class Replay:
         recording: a file, or a recording in memory.
         forces: a force file (.mot, .sto, .csv), whose rows are played as they are.
         speed: 1 is the recording's own pace; 0: as fast as it is read.
-        loop: begin again at the end, after a gap of 1 s; time goes on.
+        loop: begin again at the end, after a gap of 1 s, which a `Seam` tells of; time goes on.
         duration_s: stop after so much of the recording's time; None: at its end.
     """
 
@@ -69,14 +70,16 @@ class Replay:
             tuple(map(str, recording.notes)),
             recording.subject,
             paced=self.speed > 0.0,
+            length_s=float(recording.time[-1] - recording.time[0]),
         )
 
-    def read(self, timeout_s: float) -> list[Packet] | None:
+    def read(self, timeout_s: float) -> Sequence[Packet | Seam] | None:
         """The frames that are due."""
         own = self.recording.time
         if self._begun_s is None:
             self._begun_s = time.monotonic()
-        if self._frame >= len(own):
+        at_seam = self._frame >= len(own)
+        if at_seam:
             if not self.loop:
                 return None
             self._frame, self._row, self._round = 0, 0, self._round + 1
@@ -84,6 +87,8 @@ class Replay:
         played = own[self._frame] - own[0] + shift
         if self.duration_s is not None and played > self.duration_s:
             return None
+        if at_seam:
+            return [Seam(float(own[0] + shift))]
         if self.speed > 0.0:
             wait = self._begun_s + played / self.speed - time.monotonic()
             if wait > timeout_s:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import mmap
 import os
-import struct
 import tempfile
 from pathlib import Path
 
@@ -12,14 +11,14 @@ import numpy as np
 
 from dynakin.arrays import Array
 
-_HEAD = struct.Struct("<QQ")
+_HEAD_BYTES = 16  # the counter and the text's length
 
 
 class Latest:
     """Some numbers and a text in a file that two processes map.
 
     The writer makes the counter odd, writes, and makes it even again; a reader that saw it odd, or changed, looks
-    again.
+    again. Counter and length are whole 8-byte stores: a struct's ``pack_into`` first puts 0 there, which is even.
 
     Args:
         numbers: how many. text: bytes at most. path: of an existing one; None: a new one is made.
@@ -27,7 +26,7 @@ class Latest:
 
     def __init__(self, numbers: int, text: int = 4096, path: str | None = None) -> None:
         self.numbers, self._text = numbers, text
-        size = _HEAD.size + text + 8 * numbers
+        size = _HEAD_BYTES + text + 8 * numbers
         self._own = path is None
         if path is None:
             handle, path = tempfile.mkstemp(prefix="dynakin-live-")
@@ -37,7 +36,8 @@ class Latest:
         self.path = path
         self._map = mmap.mmap(handle, size)
         os.close(handle)
-        self._seen = 0
+        self._head = memoryview(self._map)[:_HEAD_BYTES].cast("Q")
+        self._seen = 0  # as long as nothing was written
 
     def write(self, numbers: Array, text: bytes) -> None:
         """Replace what is there.
@@ -47,28 +47,30 @@ class Latest:
         """
         if len(text) > self._text:
             raise ValueError(f"the text has {len(text)} bytes, expected {self._text} at most")
-        count = _HEAD.unpack_from(self._map, 0)[0]
-        _HEAD.pack_into(self._map, 0, count + 1, len(text))
-        self._map[_HEAD.size : _HEAD.size + len(text)] = text
-        start = _HEAD.size + self._text
+        head, start = self._head, _HEAD_BYTES + self._text
+        count = head[0]
+        head[0] = count + 1
+        head[1] = len(text)
+        self._map[_HEAD_BYTES : _HEAD_BYTES + len(text)] = text
         self._map[start : start + 8 * self.numbers] = np.ascontiguousarray(numbers, "<f8").tobytes()
-        _HEAD.pack_into(self._map, 0, count + 2, len(text))
+        head[0] = count + 2
 
     def read(self) -> tuple[Array, bytes] | None:
         """What was written since the last read, None where nothing was or it is being written just now."""
-        before, length = _HEAD.unpack_from(self._map, 0)
+        head, start = self._head, _HEAD_BYTES + self._text
+        before, length = head
         if before % 2 or before == self._seen:
             return None
-        start = _HEAD.size + self._text
         data = self._map[start : start + 8 * self.numbers]
-        text = self._map[_HEAD.size : _HEAD.size + min(length, self._text)]
-        if _HEAD.unpack_from(self._map, 0)[0] != before:
+        text = self._map[_HEAD_BYTES : _HEAD_BYTES + min(length, self._text)]
+        if head[0] != before:
             return None
         self._seen = before
         return np.frombuffer(data, "<f8").astype(float), text
 
     def close(self) -> None:
         """The maker also removes the file."""
+        self._head.release()
         self._map.close()
         if self._own:
             Path(self.path).unlink(missing_ok=True)

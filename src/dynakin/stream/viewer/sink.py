@@ -48,6 +48,7 @@ class Viewer(Sink):
         self._drawn = -np.inf
         self._deviations: Mapping[str, Labelled] | None = None
         self._plates = 0
+        self._closed = False
         self._wishes: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._process = subprocess.Popen(
@@ -97,8 +98,18 @@ class Viewer(Sink):
             found.append(self._wishes.get())
         return found
 
+    def failure(self) -> str | None:
+        """That the page's process ended before the session."""
+        if self._closed or (code := self._process.poll()) is None:
+            return None
+        return (
+            f"The live page at {self.url} is gone (its process ended with {code}; an error it printed stands above). "
+            "The session goes on without it; begin it anew to see the page."
+        )
+
     def close(self) -> None:
         """The page ends with the session."""
+        self._closed = True
         self._lines.put(None)
         try:
             self._process.wait(3.0)
@@ -116,13 +127,13 @@ class Viewer(Sink):
 
     def _send_status(self) -> None:
         assert self._process.stdin is not None
-        while (line := self._lines.get()) is not None:
-            try:
+        try:
+            while (line := self._lines.get()) is not None:
                 self._process.stdin.write(line + "\n")
                 self._process.stdin.flush()
-            except OSError:
-                return  # the page is gone; the estimate goes on
-        self._process.stdin.close()
+            self._process.stdin.close()
+        except OSError:
+            pass  # `failure` says that the page is gone
 
 
 def _free_port(host: str, first: int) -> int:

@@ -1,0 +1,51 @@
+"""What a plate reads steadily below 0 while nobody is on it, which no load does: its zero, missing under a foot too."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dynakin.arrays import Array
+from dynakin.messages import Message, note, warning
+from dynakin.recordings.plates.pressure import part_pulling, read_while_empty
+from dynakin.recordings.pushes import JUDGED_N, LASTING_PULL, UNLOADED_N
+
+_OFFSET_WORTH_A_NOTE_N = 5.0
+_STEADY = 0.8
+"""Part of what is read without a load that must be the same to `UNLOADED_N` for it to be the plate's zero."""
+
+
+class Zero(NamedTuple):
+    """wrench: (6,) N and N m, to be taken off the plate; 0 where nothing is. reads_n: what it then still reads while it
+    is empty, N (0: noise; above 0 markers say whether that is somebody's load). pulls: whether it does for long by more
+    than an offset does. said: what there is to say of it."""
+
+    wrench: Array
+    reads_n: float
+    pulls: bool
+    said: list[Message]
+
+
+def zero_of(name: str, wrench: Array, normal: Array) -> Zero:
+    """Of a plate with this wrench (N, 6) N and N m, whose normal (3,) points towards the person."""
+    push = wrench[:, :3] @ normal
+    known, reads = np.nan_to_num(push, nan=np.inf), read_while_empty(push)
+    pulls = part_pulling(push)
+    if pulls > LASTING_PULL:
+        text = (
+            f"{name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in {100.0 * pulls:.0f} % "
+            "of the recording: taken as empty there. Zero it before the trial."
+        )
+        return Zero(np.zeros(6), min(reads, 0.0), True, [warning("plates", text)])
+    own = np.abs(known - reads) < UNLOADED_N
+    if reads < 0.0 and np.count_nonzero(own) >= _STEADY * np.count_nonzero(known < JUDGED_N):
+        text = f"{name} reads {reads:.3g} N where nobody stands on it: it is taken off over the whole trial."
+        said = (warning if -reads > UNLOADED_N else note)("zero", text)
+        return Zero(np.nanmedian(wrench[own], axis=0), 0.0, False, [said])
+    if abs(reads) < _OFFSET_WORTH_A_NOTE_N:
+        return Zero(np.zeros(6), reads, False, [])
+    left = ", but not steadily (not taken off as it is read)" if reads < 0.0 else ", or by a light load"
+    return Zero(
+        np.zeros(6), reads, False, [note("plates", f"{name} reads {reads:.3g} N where nobody stands on it{left}.")]
+    )
