@@ -37,3 +37,17 @@ def test_no_two_levels_have_one_label(value: float, move: float) -> None:
     left = re.findall(r'text-anchor="end">([^<]+)<', panel.svg)
     assert len(left) > 1
     assert len(set(left)) == len(left)
+
+
+def test_a_band_of_measured_values_ends_within_the_panel() -> None:
+    time = np.linspace(0.0, 2.0, 50)
+    sd = np.where(time > 1.5, 0.35, 0.1)  # of a range of 1
+    svg = chart("Elbow", "deg", time, [Line(0.5 * time, "#000", sd=sd)]).svg
+    assert 0.5 * time[-1] + 2.0 * sd[-1] < _top(svg)
+
+
+def _top(svg: str) -> float:
+    """Value at a panel's upper end, from the levels beside it."""
+    levels = re.findall(r'y="(\d+)" text-anchor="end">([^<]+)<', svg)
+    (low_y, low), (high_y, high) = ((int(y) - 28, float(text.replace("−", "-"))) for y, text in (levels[0], levels[-1]))
+    return high + (high - low) * (high_y - 70) / (low_y - high_y)

@@ -142,13 +142,17 @@ def _range(lines: Sequence[Line], levels: Sequence[float], least: float) -> tupl
     least = max(least, _LEAST_RANGE * max(abs(low), abs(high)), 1e-9)
     if high - low < least:
         low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
-    # a band may reach out of the lines' own range by half of it, beyond that it is cut
-    spread = high - low
+    # a band of measured values ends where its doubt does, within reason; one that says how little is known may be cut
+    bottom, top, spread = low, high, high - low
     for line in lines:
-        if line.sd is not None and np.isfinite(line.sd).any():
-            band = 2.0 * line.sd
-            low = max(min(low, float(np.nanmin(line.values - band))), low - 0.25 * spread)
-            high = min(max(high, float(np.nanmax(line.values + band))), high + 0.25 * spread)
+        if line.sd is None:
+            continue
+        sure = np.ones(len(line.values), bool) if line.source is None else line.source == MEASURED
+        for frames, most in ((sure, 0.75), (~sure, 0.25)):
+            edges = (line.values + 2.0 * np.outer((-1.0, 1.0), line.sd))[:, frames]
+            edges = np.clip(edges[np.isfinite(edges)], low - most * spread, high + most * spread)
+            bottom, top = float(np.min(edges, initial=bottom)), float(np.max(edges, initial=top))
+    low, high = bottom, top
     more = (0.2 if levels else _MARGIN) * (high - low)
     return low - more, high + more
 
