@@ -366,6 +366,16 @@ def test_the_console_says_first_what_is_measured(monkeypatch: pytest.MonkeyPatch
     assert "off the plates from 1.70 to 2.30 s" in second
 
 
+def test_a_note_that_stands_above_is_not_said_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    text, zero = io.StringIO(), note("zero", "plate 2 reads -7.86 N where nobody stands on it: it is taken off.")
+    walker = replace(make_walker(), messages=[zero])
+    monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=1000))
+    summary.print_summary(Result(walker), Path("out"), [zero])
+    assert "plate 2 reads" not in text.getvalue()
+    summary.print_summary(Result(walker), Path("out"))
+    assert text.getvalue().count("plate 2 reads") == 1
+
+
 def test_a_verdict_says_in_a_clause_what_it_found_where_the_sentences_stand_above(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
