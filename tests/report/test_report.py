@@ -293,6 +293,15 @@ def test_of_lengths_the_bar_and_the_numbers_beside_it_are_the_same(estimate: Est
     assert "4.4 → 3.5 mm" in render_report(own)
 
 
+def test_what_is_left_of_a_length_s_deviation_is_said_to_be_without_skin(estimate: Estimate) -> None:
+    bare = {insight.title: insight.text for insight in insights(estimate, compute_metrics(estimate))}
+    skin = [replace(p, skin_sd=8.4e-3) if p.kind == "length" else p for p in estimate.parameters]
+    own = replace(estimate, parameters=skin)
+    found = {insight.title: insight.text for insight in insights(own, compute_metrics(own))}
+    assert found["Lengths"] == f"{bare['Lengths'][:-1]}, not counting skin that follows a joint."
+    assert found["Masses"] == bare["Masses"]
+
+
 def test_a_band_of_a_length_ends_within_its_panel(estimate: Estimate) -> None:
     wide = estimate.data["state_sd"].copy(data=np.full(estimate.data["state_sd"].shape, 0.02))
     own = replace(estimate, data=estimate.data.assign(state_sd=wide))
