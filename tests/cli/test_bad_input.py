@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dynakin.cli import compare_inputs
 from dynakin.cli.app import main
+from dynakin.errors import ConfigError
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.results.files.markers import write_trc
@@ -130,6 +132,34 @@ def test_a_frame_without_any_marker(trial: Path, squat: Recording, refused: Refu
 
 def test_mass_of_zero(trial: Path, refused: Refused, tmp_path: Path) -> None:
     assert "mass_kg" in refused("run", trial, *_options(tmp_path, mass="0"))
+
+
+@pytest.mark.parametrize("command", ["fit", "grid"])
+def test_tune_takes_the_forces_beside_its_trial(command: str, trial: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    there = (trial.parent / "squat.mot").rename(trial.parent / "squat_grf.mot")
+    taken: list[Path | None] = []
+
+    def cases_of(trials: list[Path], forces: list[Path | None], *_: object) -> None:
+        taken.extend(forces)
+        raise ConfigError("as far as this")
+
+    monkeypatch.setattr(compare_inputs, "cases_of", cases_of)
+    assert main(["tune", command, str(trial), str(trial.parent / "other.trc"), "-o", str(trial.parent / "out")]) == 2
+    assert taken == [there, None]
+
+
+def test_a_decimal_comma_is_told(trial: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["--mass", "60,05"], ["--mass=60,05"]):
+        assert main(["run", str(trial), *words, "-o", "out"]) == 2
+        assert capsys.readouterr().err.endswith("--mass is 60,05, expected a number with a decimal point: 60.05\n")
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_a_folder_is_no_trial(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, str(tmp_path)]) == 2
+    assert f"{tmp_path}: is a folder, expected a recording (.c3d, .csv or .trc)" in " ".join(
+        capsys.readouterr().err.split()
+    )
 
 
 def test_a_number_in_another_unit_names_the_option(trial: Path, refused: Refused, tmp_path: Path) -> None:

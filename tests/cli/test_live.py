@@ -108,6 +108,7 @@ def test_a_recording_that_is_too_short_is_told_so(tmp_path: Path, capsys: Said) 
     [
         (["--source", "nowhere:x"], "expected one of lsl:..., qtm:..., replay:..., simulate:..."),
         (["--source", "replay:none.c3d"], "none.c3d"),
+        (["--source", "squats1.trc"], "'squats1.trc' is a file, expected replay:squats1.trc"),
         (["--source", "replay:x.trc,sped=2"], "unknown option 'sped'"),
         (["--source", "replay:x.trc,loop=maybe"], "loop is 'maybe', expected loop alone, or loop=yes or loop=no"),
         (["--source", "simulate:squat,loop=maybe"], "loop is 'maybe'"),

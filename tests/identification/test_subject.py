@@ -92,6 +92,7 @@ def test_a_gain_is_said_with_its_sign() -> None:
     said = Decision("table", ("a", "b"), rms, rms).in_words()  # type: ignore[arg-type]
     assert said[-1].startswith("The table is kept: held-out gain -1 %")
     same = {"table": np.ones((2, 3)), "bodies": np.full((2, 3), 1.001)}
+    assert said[1].startswith("Table: ") and said[2].startswith("Identified parameters: ")
     assert "-0 %" not in " ".join(Decision("table", ("a", "b"), same, same).in_words())  # type: ignore[arg-type]
 
 
@@ -195,8 +196,10 @@ def command_line(files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture
     file = tmp_path / "subject.toml"
     assert main(["identify", *files, *OPTIONS, "-o", str(file)]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    for words in ("held-out gain", "70.00 kg of 70.00", "base parameters", "simulated_squat_3/markers, first half"):
+    for words in ("held-out gain", "70.00 kg of 70.00", "base parameters", "first half of simulated_squat_3/markers"):
         assert words in said
+    assert "Identified parameters: FX" in said and "of the sums that hold" in said
+    assert "/m" not in said.partition("of the sums that hold")[2].partition(": these lean")[0]
     assert [path.name for path in tmp_path.iterdir()] == ["subject.toml"]
     assert main(["identify", "--compare", str(file), str(file)]) == 0
     assert "None of 22 base parameters changed" in " ".join(capsys.readouterr().out.split())

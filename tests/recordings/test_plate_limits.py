@@ -12,7 +12,7 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.limits import beyond_limits
-from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import Surface, part_pulling, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
 from support.made_recordings import standing
 from support.real_trials import real_trials
@@ -100,3 +100,7 @@ def test_scaled_channels_of_real_plates_are_refused(data_dir: Path, name: str, a
     loaded = max(recording.plates, key=lambda plate: float(np.nansum(plate.force[:, 1])))
     text = refusal(recording, scaled(loaded, axis, 1000.0))
     assert text.startswith(f"{loaded.name}: the horizontal force, mostly its {'xyz'[axis]} component")
+
+
+def test_a_plate_without_samples_pulls_in_none() -> None:
+    assert part_pulling(np.empty(0)) == 0.0

@@ -139,7 +139,7 @@ def test_absent_legs_are_not_drawn_and_the_page_says_so_first() -> None:
     metrics = compute_metrics(gone)
     section = moment_section(Page(gone, metrics))
     assert section.text.startswith("Leg moments: absent in all 301 frames.")
-    assert [panel.title for part in section.parts for panel in [*part.panels, *part.folded]] == ["Arm flex"]
+    assert [panel.title for part in section.parts for panel in [*part.panels, *part.folded]] == ["Arm flex (+ flexion)"]
     assert "Absent in every frame: right knee and left knee." in section.text
     assert section.notes == (gone.messages[-1].text,)
     data["moment_source"][:], data["moments"][:] = ABSENT, np.nan
@@ -191,6 +191,7 @@ def test_mean_curves_say_how_many_cycles_are_left(walker: Estimate) -> None:
     section = side_repetitions(walker, Found("gait", cycles, "2 gait cycles."), curves)
     knee = titled(section.parts[1].panels, "Knee")
     assert "left: 1 of 2 repetitions" in knee.note
+    assert knee.title == "Knee (+ flexion)"
     gone = mean_curves(time, cycles[1:], {"EKF": [s for s in own if s.quantity != "knee_angle_r/moment"]}, 60.0)
     section = side_repetitions(walker, Found("gait", cycles[1:], "1 gait cycle."), gone)
     assert "No cycle is left of the moments of knee." in section.text

@@ -18,6 +18,7 @@ from dynakin.report.findings.finding import Insight
 from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import moment_note, short_marker_names
 from dynakin.report.page import SECTIONS, render_report
+from dynakin.report.sections.constants import length_section
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.styles import thin
 from dynakin.report.text_tables import TextTable
@@ -26,6 +27,7 @@ from dynakin.results.measures.consistency import Consistency, Judgement
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.naming import listed, number
 from dynakin.results.records import REFUSED, Event, EventKind
+from dynakin.settings.lag import ALL_FRAMES
 from support.estimates.synthetic import make_estimate
 from support.page import Structure
 
@@ -279,6 +281,43 @@ def test_what_the_recording_tells_is_shown_where_the_prior_is_known(html: str, e
     lengths = sum(p.kind == "length" and p.estimated for p in parameters)
     assert f"Lengths ({lengths}): {lengths} known from the data." in section
     assert "Moments of inertia" in section and "Movements that would help" not in section
+
+
+def test_of_lengths_the_bar_and_the_numbers_beside_it_are_the_same(estimate: Estimate) -> None:
+    length = replace(
+        next(p for p in estimate.parameters if p.kind == "length"), prior_sd=4.4e-3, sd=9.1e-3, skin_sd=8.4e-3
+    )
+    own = replace(estimate, parameters=[length])
+    entry = compute_metrics(own)["identifiability"]["parameters"][length.name]
+    assert entry["sd"] / entry["prior_sd"] == pytest.approx(entry["share"])
+    assert "4.4 → 3.5 mm" in render_report(own)
+
+
+def test_what_is_left_of_a_length_s_deviation_is_said_to_be_without_skin(estimate: Estimate) -> None:
+    bare = {insight.title: insight.text for insight in insights(estimate, compute_metrics(estimate))}
+    skin = [replace(p, skin_sd=8.4e-3) if p.kind == "length" else p for p in estimate.parameters]
+    own = replace(estimate, parameters=skin)
+    found = {insight.title: insight.text for insight in insights(own, compute_metrics(own))}
+    assert found["Lengths"] == f"{bare['Lengths'][:-1]}, not counting skin that follows a joint."
+    assert found["Masses"] == bare["Masses"]
+
+
+def test_a_band_of_a_length_ends_within_its_panel(estimate: Estimate) -> None:
+    wide = estimate.data["state_sd"].copy(data=np.full(estimate.data["state_sd"].shape, 0.02))
+    own = replace(estimate, data=estimate.data.assign(state_sd=wide))
+    found = length_section(Page(own, compute_metrics(own)))
+    for panel in found.panels:
+        band = re.search(r'<path d="M\d+ (\d+)[^"]*" class="spread"', panel.svg)
+        assert band is not None
+        assert int(band.group(1)) > 70, panel.title
+
+
+def test_a_smoothed_run_shows_no_masses_over_time(estimate: Estimate) -> None:
+    smoothed = replace(estimate, config=estimate.config | {"lag_s": ALL_FRAMES})
+    assert 'id="masses"' in render_report(estimate)
+    html = render_report(smoothed)
+    assert 'id="masses"' not in html
+    assert "settles on" not in html
 
 
 def test_numbers_in_the_words_of_a_figure_keep_their_digits() -> None:

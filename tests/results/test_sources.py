@@ -135,7 +135,7 @@ def test_a_prior_of_the_feet_is_counted_and_said() -> None:
     data["foot_contact"][:], data["foot_source"][:] = SHARED_PLATE, PRIOR
     data["moment_source"][:, :3] = PRIOR
     shared = compute_metrics(replace(walker, data=data))
-    assert "in the 301 of 301 frames in which every contact" in shared["feet"]["verdict"]  # their sum is measured
+    assert "in the 295 of 301 frames in which every contact" in shared["feet"]["verdict"]  # their sum is measured
     assert shared["feet"]["adjustment_rms"] == {"right": None, "left": None}
     assert shared["asymmetry"]["feet"] == {"peak_vertical_force": None, "impulse": None}
     assert not {"knee_angle_r", "knee_angle_l"} & {*shared["peak_moments_per_kg"], *shared["work"]}
@@ -322,7 +322,7 @@ def test_impulse_is_the_stances() -> None:
 def test_nothing_left_at_the_root_is_said_by_the_numbers_only() -> None:
     walker = make_walker((2,))
     feet = compute_metrics(walker)["feet"]
-    assert feet["verdict"].startswith("No residual is left at the root in the 241 of 301 frames in which every contact")
+    assert feet["verdict"].startswith("No residual is left at the root in the 235 of 301 frames in which every contact")
     data = walker.data.copy(deep=True)
     data["wrench_remainder"][50, 1] = 718.0
     data["wrench_remainder"][[0, -1], 1] = 900.0  # accelerations are a guess there
@@ -343,7 +343,7 @@ def test_nothing_left_at_the_root_is_said_by_the_numbers_only() -> None:
     assert "Up to 718 N and 0 N m of residual are left at the root" in contradicted["verdict"]
     seated = walker.data.copy(deep=True)  # both feet measured, and yet not all that bears the person
     seated["moment_source"][:100, 0] = ABSENT
-    assert "in the 141 of 301 frames" in compute_metrics(replace(walker, data=seated))["feet"]["verdict"]
+    assert "in the 138 of 301 frames" in compute_metrics(replace(walker, data=seated))["feet"]["verdict"]
     data["foot_contact"][:] = 0  # both feet "in the air" for three seconds
     flying = compute_metrics(replace(walker, data=data))["feet"]["verdict"]
     assert (
@@ -364,6 +364,25 @@ def test_the_console_says_first_what_is_measured(monkeypatch: pytest.MonkeyPatch
     first, second = text.getvalue().splitlines()[:2]
     assert first.startswith("Leg moments: right measured in 301 of 301 frames")
     assert "off the plates from 1.70 to 2.30 s" in second
+
+
+def test_without_plates_nothing_is_said_to_be_measured() -> None:
+    walker = make_walker()
+    data = walker.data.copy(deep=True)
+    data["moment_source"][24:] = DERIVED
+    bare = replace(walker, data=data, recording=replace(walker.recording, plates=()))
+    verdict = compute_metrics(bare)["moments"]["verdict"]
+    assert "known (in the air) in 24 of 301 frames" in verdict and "measured" not in verdict
+
+
+def test_a_note_that_stands_above_is_not_said_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    text, zero = io.StringIO(), note("zero", "plate 2 reads -7.86 N where nobody stands on it: it is taken off.")
+    walker = replace(make_walker(), messages=[zero])
+    monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=1000))
+    summary.print_summary(Result(walker), Path("out"), [zero])
+    assert "plate 2 reads" not in text.getvalue()
+    summary.print_summary(Result(walker), Path("out"))
+    assert text.getvalue().count("plate 2 reads") == 1
 
 
 def test_a_verdict_says_in_a_clause_what_it_found_where_the_sentences_stand_above(

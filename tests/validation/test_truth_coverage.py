@@ -22,7 +22,7 @@ def draws(frames: int = 4000, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
 
 def test_right_standard_deviations_are_consistent() -> None:
     found = coverage("coordinates", NAMES, *draws(), own_model=True)
-    assert found.judgement == "consistent" and found.sizes() == "right"
+    assert found.judgement == "consistent" and found.sizes() == "right to a factor of 1.0" and found.seldom == {}
     assert found.inside == pytest.approx([0.95, 0.95], abs=0.012)
     assert found.mean_square == pytest.approx(1.0, abs=0.07)
     assert found.interval_95[0] < found.mean_square < found.interval_95[1]
@@ -52,6 +52,16 @@ def test_wrong_standard_deviations_are_told_with_their_size(factor: float, judge
     assert found.judgement == judgement and found.sizes() == text
     assert (found.pooled < 0.5) == (judgement == "overconfident")
     assert found.verdict().startswith(f"Speeds: {judgement}.") and text in found.verdict()
+
+
+def test_an_element_that_a_mean_hides_is_named() -> None:
+    """The demo said "consistent" of angles of which the knee's truth lay in 30 % of its intervals."""
+    error, sd = draws()
+    error[:, 0] = 2.2 * sd[:, 0]
+    error[:, 1] *= 0.5
+    found = coverage("coordinates", NAMES, error, sd)
+    assert found.seldom == {NAMES[0]: 0.0}
+    assert found.factor == pytest.approx(1.6, abs=0.05)
 
 
 def test_what_holds_the_truth_too_seldom_is_overconfident_whatever_the_mean_is() -> None:

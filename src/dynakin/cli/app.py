@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import os
+import re
 import sys
 from collections.abc import Sequence
 from itertools import pairwise
@@ -62,6 +63,7 @@ def _root(
     """How a person moves and what drives the movement, from markers and force plates."""
 
 
+_DECIMAL_COMMA = re.compile(r"-?\d+,\d+")
 _MORE_BEFORE_GARBAGE = 100_000
 """New objects before Python collects reference cycles. By its own 700 it looks 500 times while libraries are loaded
 and results written, for a sixteenth of a short run."""
@@ -93,7 +95,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 2
         text = str(getattr(error, "format_message", error.__str__)()).rstrip(".")
         command = getattr(getattr(error, "ctx", None), "command_path", "dynakin")
-        print_error(f"{text}. See {command} --help.")
+        print_error(_with_a_comma(words, text) or f"{text}. See {command} --help.")
         return 2
     except (KeyboardInterrupt, typer.Abort):
         code = STOPPED
@@ -115,4 +117,12 @@ def _without_value(words: Sequence[str], command: Any) -> str | None:
     for option, value in pairwise(words):
         if option in valued and value in names:
             return f"Option {option} has no value: after it stands {value}, an option itself. See dynakin --help."
+    return None
+
+
+def _with_a_comma(words: Sequence[str], said: str) -> str | None:
+    """What is wrong where the option that a refusal names has a number with a decimal comma."""
+    for option, value in [*pairwise(words), *(tuple(word.split("=", 1)) for word in words if "=" in word)]:
+        if f"'{option}'" in said and _DECIMAL_COMMA.fullmatch(value):
+            return f"{option} is {value}, expected a number with a decimal point: {value.replace(',', '.')}"
     return None

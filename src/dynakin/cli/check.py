@@ -51,7 +51,7 @@ def check(
     print_rows(console, recording_rows(case.recording))
     ready, refusal = rehearsed(case)
     if ready is not None:
-        print_rows(console, model_rows(ready, settings, refusal))
+        print_rows(console, model_rows(ready, settings, refusal, case.recording.notes))
     else:
         print_rows(console, [("Markers", text) for text in nearest_sets(case.recording)])
     print_rows(console, [("Add", text) for text in to_add(case, ready, refusal)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -90,8 +91,14 @@ def _gaps(recording: Recording) -> str:
     return f"{len(gappy)} of {len(share)} markers have gaps: {', '.join(listed[:_LISTED])}{rest}."
 
 
-def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None) -> Rows:
-    """What `run` says first, with what it rests on, and what will come out."""
+def model_rows(
+    ready: Prepared, settings: Settings, refusal: DynakinError | None, above: Sequence[Message] = ()
+) -> Rows:
+    """What `run` says first, with what it rests on, and what will come out.
+
+    Args:
+        above: what was said of the recording (`recording_rows`), which is not doubted a second time.
+    """
     calibrated = ready.calibrated
     said = calibrated.messages
     subject = about(said, "mass", "height", "sex")
@@ -115,7 +122,7 @@ def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None
     if refusal is not None:
         return rows
     figures = ready.moment_figures()
-    doubts = [message for message in warnings_of(ready.messages) if message not in said or message in doubted]
+    doubts = [m for m in warnings_of(ready.messages) if m not in (*said, *above) or m in doubted]
     there = [sentence(message.text) for message in doubts]  # with what to do
     rows += [("Results", text) for text in (figures["verdict"], *figures["reasons"]) if text not in there]
     rows += [("Results", message.text) for message in notes_of(about(ready.messages, "carried"))]

@@ -46,7 +46,7 @@ def halves_of(case: Case) -> tuple[Case, Case]:
 
 def cases_of(
     trials: Sequence[Path],
-    forces: Sequence[Path],
+    forces: Sequence[Path | None],
     presets: Sequence[str],
     cutoff_hz: float,
     given: Given,
@@ -55,7 +55,8 @@ def cases_of(
     """One case a trial; a trial may be a configuration (.toml) of its own, over which the command line wins.
 
     Args:
-        forces: none, or one a trial in the same order. presets: by name; none: the configuration's own.
+        forces: none, or one a trial in the same order, None for one that has none. presets: by name; none: the
+            configuration's own.
         given: further keys of the settings, of the command line. command: opens messages.
 
     Raises:
@@ -69,12 +70,20 @@ def cases_of(
             f"{command}: --forces was given {_times(len(forces))} for {plural(len(trials), 'trial')}, expected one for "
             "each, in the same order, or none"
         )
-    files = [{"forces": force} for force in forces] or [{}] * len(trials)
+    files = [{"forces": force} if force else {} for force in forces] or [{}] * len(trials)
     cases = [_case(trial, given | file, presets, cutoff_hz, command) for trial, file in zip(trials, files, strict=True)]
     names = told_apart([case.recording for case in cases])
     return [
         replace(case, recording=replace(case.recording, name=name)) for case, name in zip(cases, names, strict=True)
     ]
+
+
+def named_forces(path: Path) -> Path | None:
+    """Ground forces in a trial's folder: as recordings are often named, or as `dynakin simulate` names them."""
+    for name in (f"{path.stem}_grf.mot", *(["forces.mot"] if path.stem == "markers" else [])):
+        if path.with_name(name).is_file():
+            return path.with_name(name)
+    return None
 
 
 def refuse_copies_of(cases: Sequence[Case]) -> None:

@@ -10,8 +10,9 @@ from dynakin.cli.console import table
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import truth_error
 from dynakin.results.measures.metrics import evaluation_window
+from dynakin.results.naming import listed
 from dynakin.simulation.truth import Truth
-from dynakin.validation.coverage import block_coverage, parameter_coverage
+from dynakin.validation.coverage import Coverage, block_coverage, parameter_coverage
 from dynakin.validation.truth import FIGURES, LEG, parameter_errors, truth_errors
 
 
@@ -22,7 +23,7 @@ def methods_by_error(methods: dict[str, xr.Dataset], estimate: Estimate, truth: 
     rows = table("", *methods, numbers=columns, title="Methods by RMS error against the truth")
     errors = [truth_errors(name, data, truth.data, window, LEG).values for name, data in methods.items()]
     for (title, unit), values in zip(FIGURES, zip(*errors, strict=True), strict=True):
-        rows.add_row(f"{title}, {unit}", *(f"{value:.0f}" if value >= 10.0 else f"{value:.2g}" for value in values))
+        rows.add_row(f"{title}, {unit}", *map(_two_digits, values))
     return rows
 
 
@@ -68,10 +69,21 @@ def own_uncertainty(estimate: Estimate, truth: Truth) -> Table:
             block.block,
             f"{100.0 * block.pooled:.0f} %",
             "" if about_mean is None else f"{100.0 * about_mean:.0f} %",
-            f"{block.mean_square:.2g}",
-            block.judgement if block.judgement == "consistent" else f"{block.judgement}, {block.sizes()}",
+            _two_digits(block.mean_square),
+            _judged(block),
         )
     return rows
+
+
+def _judged(block: Coverage) -> str:
+    """How large the deviations are, by all elements of a block; then those that they do not hold for."""
+    text = block.sizes() if block.judgement == "consistent" else f"{block.judgement}, {block.sizes()}"
+    found = [f"{name} (in {100.0 * share:.0f} %)" for name, share in block.seldom.items()]
+    return f"{text}, too small for {listed(found)}" if found else text
+
+
+def _two_digits(value: float) -> str:
+    return f"{value:#.2g}" if value < 9.95 else f"{value:.0f}"
 
 
 def constants_in_words(estimate: Estimate, truth: Truth) -> str:

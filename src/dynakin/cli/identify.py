@@ -102,29 +102,21 @@ def _check_output(output: Path) -> None:
 
 def _read(paths: list[Path], forces: list[Path], static: Path | None) -> tuple[list[Recording], Recording | None]:
     """The trials and the standing one, each with the ground forces given or found in its folder."""
-    from dynakin.cli.compare_inputs import told_apart
+    from dynakin.cli.compare_inputs import named_forces, told_apart
     from dynakin.recordings.read import read
     from dynakin.results.naming import plural
 
     if forces and len(forces) != len(paths):
         counted = f"{plural(len(forces), 'force file')} for {plural(len(paths), 'trial')}"
         raise ConfigError(f"identify: {counted}, expected one a trial or none")
-    chosen: list[Path | None] = [*forces] or [_forces_of(path) for path in paths]
+    chosen: list[Path | None] = [*forces] or [named_forces(path) for path in paths]
     recordings = [read(path, force) for path, force in zip(paths, chosen, strict=True)]
     names = told_apart(recordings)
     recordings = [replace(recording, name=name) for recording, name in zip(recordings, names, strict=True)]
     if static is None:
         return recordings, None
     same = [recording for path, recording in zip(paths, recordings, strict=True) if path.resolve() == static.resolve()]
-    return recordings, same[0] if same else read(static, _forces_of(static))
-
-
-def _forces_of(path: Path) -> Path | None:
-    """Ground forces in a trial's folder: as recordings are often named, or as `dynakin simulate` names them."""
-    for name in (f"{path.stem}_grf.mot", *(["forces.mot"] if path.stem == "markers" else [])):
-        if path.with_name(name).is_file():
-            return path.with_name(name)
-    return None
+    return recordings, same[0] if same else read(static, named_forces(static))
 
 
 def _compare(paths: list[Path]) -> None:

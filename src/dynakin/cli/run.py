@@ -43,6 +43,7 @@ def run(
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
     with stage("loading"):  # the libraries alone take seconds on a busy machine
         from dynakin.cli.prepared import assumed, changed, naming_static, print_rows
+        from dynakin.messages import notes_of
         from dynakin.pipeline.stages import configure, prepare_case, run_case
         from dynakin.results.files.folder import check_folder_writable, check_output_writable
         from dynakin.results.naming import plural
@@ -80,7 +81,7 @@ def run(
     failures = result.failures
     saved = len(failures.found)
     with failures.stage("summary"):
-        print_summary(result, folder)
+        print_summary(result, folder, notes_of(first.recording.notes))
     if figures is not None:
         with failures.stage("figures"):
             written = result.save_figures(figures, sensitivity=grid)

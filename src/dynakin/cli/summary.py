@@ -13,7 +13,7 @@ from rich.table import Table
 
 from dynakin.cli.console import out, print_error, table
 from dynakin.filter.ground.closure import STATED
-from dynakin.messages import about, notes_of
+from dynakin.messages import Message, about, notes_of
 from dynakin.pipeline.result import Result
 from dynakin.report.findings.finding import Insight
 from dynakin.report.insights import in_short, insights
@@ -25,8 +25,12 @@ from dynakin.results.naming import listed
 from dynakin.settings.lag import in_words
 
 
-def print_summary(result: Result, folder: Path) -> None:
-    """Which moments there are, the figures, the verdict with all that is warned of, and where the files lie."""
+def print_summary(result: Result, folder: Path, said: Sequence[Message] = ()) -> None:
+    """Which moments there are, the figures, the verdict with all that is warned of, and where the files lie.
+
+    Args:
+        said: notes that stand above already.
+    """
     console, estimate, metrics = out(), result.estimate, result.metrics()
     moments = metrics["moments"] or UNKNOWN
     _print_moments(console, moments)
@@ -34,7 +38,8 @@ def print_summary(result: Result, folder: Path) -> None:
         console.print(f"  {_contact_in_words(name, found)}", style="dim")
     console.print(_figures(estimate, metrics))
     for message in notes_of(about(estimate.messages, "smoothing", "in step", "zero", "carried")):
-        console.print(str(message))
+        if message not in said:
+            console.print(str(message))
     _print_verdict(console, insights(estimate, metrics), moments["reasons"])
     console.print(f"Results  {folder}", soft_wrap=True)
     if (folder / "report.html").exists():

@@ -16,7 +16,6 @@ from dynakin.cli.options import (
     OF_THE_LABORATORY,
     OF_THE_PLATES,
     Backend,
-    ForceEach,
     Given,
     Jobs,
     Scheduler,
@@ -39,6 +38,11 @@ tune = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Choose noi
 
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder for table, figures and presets.")]
 
+Forces = Annotated[
+    list[Path] | None,
+    typer.Option("--forces", help="Ground forces of the trials, in their order; else TRIAL_grf.mot by each."),
+]
+
 _of_trials = with_settings(*OF_A_MODEL, "preset", *OF_THE_LABORATORY, *OF_THE_PLATES)
 _GAINS = ("coordinate_variance", "speed_variance", "acceleration_variance")
 
@@ -48,7 +52,7 @@ _GAINS = ("coordinate_variance", "speed_variance", "acceleration_variance")
 def grid(
     output: Output,
     trials: Trials = None,
-    forces: ForceEach = None,
+    forces: Forces = None,
     *,
     given: Given,
     vary: Annotated[
@@ -66,7 +70,7 @@ def grid(
 
     A run that was stopped goes on where it was when it is started again with the same folder.
     """
-    from dynakin.cli.compare_inputs import cases_of
+    from dynakin.cli.compare_inputs import cases_of, named_forces
     from dynakin.report.paper_figures.figures import save_sensitivity_figures
     from dynakin.studies.engine.journal import ROWS, Journal, open_folder
     from dynakin.studies.engine.pools import open_pool
@@ -74,7 +78,9 @@ def grid(
     from dynakin.studies.tuning.output import criteria_text, grid_text, write_grid
 
     preset = given.pop("preset", None)
-    cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune grid")
+    cases = cases_of(
+        trials or [], forces or [named_forces(path) for path in trials or []], [], CUTOFF_HZ, given, "tune grid"
+    )
     axes = axes_of(vary or [], cases)
     check_size(axes)
     base = preset or ("paper" if not vary and cases[0].config.grid is None else cases[0].config.preset)
@@ -102,7 +108,7 @@ def grid(
 def fit(
     output: Output,
     trials: Trials = None,
-    forces: ForceEach = None,
+    forces: Forces = None,
     *,
     given: Given,
     vary: Annotated[
@@ -117,14 +123,16 @@ def fit(
 
     A run that was stopped goes on where it was when it is started again with the same folder.
     """
-    from dynakin.cli.compare_inputs import cases_of
+    from dynakin.cli.compare_inputs import cases_of, named_forces
     from dynakin.studies.engine.journal import ROWS, Journal, open_folder
     from dynakin.studies.engine.pools import open_pool
     from dynakin.studies.tuning.fit import Fitter, belongs_to_fit, usual_names
     from dynakin.studies.tuning.output import figures_text, recommendation, settings_text, write_fit
 
     preset = given.pop("preset", None)
-    cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune fit")
+    cases = cases_of(
+        trials or [], forces or [named_forces(path) for path in trials or []], [], CUTOFF_HZ, given, "tune fit"
+    )
     base = preset or cases[0].config.preset
     shared = shared_of(cases, base)
     names = tuple(vary) if vary else usual_names(shared.base, shared.floating)

@@ -77,4 +77,5 @@ class Prepared:
         data = xr.Dataset(coords=labels(self.tracker.core_model, calibrated, self.recording.time, contacts))
         if contacts is not None:
             data = data.isel(foot=[name != RESIDUAL for name in contacts.names])
-        return source_figures(data, sources, [reason.text for reason in self.ground.reasons])
+        reasons = [reason.text for reason in self.ground.reasons]
+        return source_figures(data, sources, reasons, plates=bool(self.recording.plates))

@@ -23,6 +23,7 @@ from dynakin.units import COMPONENTS
 
 Use = Literal["table", "bodies"]
 USES: tuple[Use, ...] = get_args(Use)
+_CALLED: dict[Use, str] = {"table": "Table", "bodies": "Identified parameters"}
 
 GAIN = 0.97
 """Mean RMS over the table's from which on the table is left: 3 % is within what two halves of a trial differ by."""
@@ -75,7 +76,7 @@ class Decision:
                 f"{name.upper()} {value:.1f} {'N' if name.startswith('f') else 'N m'}"
                 for name, value in zip(self.components, values, strict=True)
             ]
-            said.append(f"{use.capitalize()}: {', '.join(each)}.")
+            said.append(f"{_CALLED[use]}: {', '.join(each)}.")
         gain = 100.0 * (1.0 - self.ratios.mean())
         worst = 100.0 * (self.ratios.max() - 1.0)
         verdict = (
@@ -144,7 +145,7 @@ def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress |
         RecordingError: too few frames with the plates' wrench.
     """
     parts = parts_of(trials)
-    halves = (", first half", ", second half") * len(trials) if len(parts) > len(trials) else ("",) * len(trials)
+    halves = ("first half of ", "second half of ") * len(trials) if len(parts) > len(trials) else ("",) * len(trials)
     names: list[str] = []
     low_passed: list[dict[Use, Array]] = []
     full_band: list[dict[Use, Array]] = []
@@ -158,7 +159,7 @@ def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress |
             for rows, part in ((low_passed, left_out), (full_band, left_out.full_band())):
                 states = part.movement.states
                 rows.append({use: rms_of(common, part, one.wrench(common, states)) for use, one in found.items()})
-            names.append(left_out.movement.recording.name + half)
+            names.append(half + left_out.movement.recording.name)
         if progress is not None:
             progress(k + 1, len(parts))
     rms, unfiltered = (

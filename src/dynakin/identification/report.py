@@ -11,6 +11,7 @@ from dynakin.arrays import Array
 from dynakin.errors import ModelError
 from dynakin.identification.batch import Posterior
 from dynakin.identification.decision import Decision
+from dynakin.identification.observability.element_words import inertia_words, is_planar
 from dynakin.identification.observability.structure import base_spread
 from dynakin.model.identified import Batch, IdentifiedSubject
 from dynakin.results.measures.posterior import judged
@@ -89,9 +90,10 @@ def base_in_words(batch: Batch) -> list[str]:
         for k in best
     ]
     said.append(f"Best known: {'; '.join(known)}.")
-    none = [names[k].removeprefix("inertia/") for k in range(len(share)) if verdicts[k] == "nothing"]
+    planar = is_planar(batch.names)
+    none = [inertia_words(names[k], planar=planar) for k in range(len(share)) if verdicts[k] == "nothing"]
     if none:
-        said.append(f"The data say nothing of the sums named after {listed(none, 30)}: these lean on the table.")
+        said.append(f"The data say nothing of the sums that hold {listed(none, 30)}: these lean on the table.")
     return said
 
 

@@ -16,6 +16,7 @@ from dynakin.filter.tracker import Tracker
 from dynakin.filter.zero import zero_window
 from dynakin.messages import note
 from dynakin.progress import Progress, stage
+from dynakin.recordings.read import extensions
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
@@ -117,6 +118,8 @@ def configure(
     Raises:
         ConfigError: a key that is unknown or missing, or a value that is wrong.
     """
+    if trial.is_dir():
+        raise ConfigError(f"{trial}: is a folder, expected a recording ({extensions()}) or a configuration (.toml)")
     is_config = trial.suffix.casefold() == ".toml"
     content = {**(defaults or {}), **(read_keys(trial) if is_config else {"trial": trial})}
     known = {key: value for key, value in given.items() if value is not None}

@@ -26,6 +26,8 @@ _UNSEEN = 3.0
 """Less than half of a screen's pixel, and a third of a line's width."""
 _STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
 _ROUNDING = 1e-10  # of a step
+_LEAST_RANGE = 1e-3
+"""Of the values: what moves less is drawn as the flat line that it is, and its levels differ in few digits."""
 _RARE = 2.0
 """Per cent of derived values and priors that may leave the panel at either end: a centre of pressure is far off where a
 foot sets down."""
@@ -136,16 +138,20 @@ def _range(lines: Sequence[Line], levels: Sequence[float], least: float) -> tupl
     if not len(values):
         return -1.0, 1.0
     low, high = float(values.min()), float(values.max())
-    least = max(least, 1e-9 * max(1.0, abs(low), abs(high)))
+    least = max(least, _LEAST_RANGE * max(abs(low), abs(high)), 1e-9)
     if high - low < least:
         low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
-    # a band may reach out of the lines' own range by half of it, beyond that it is cut
-    spread = high - low
+    # a band of measured values ends where its doubt does, within reason; one that says how little is known may be cut
+    bottom, top, spread = low, high, high - low
     for line in lines:
-        if line.sd is not None and np.isfinite(line.sd).any():
-            band = 2.0 * line.sd
-            low = max(min(low, float(np.nanmin(line.values - band))), low - 0.25 * spread)
-            high = min(max(high, float(np.nanmax(line.values + band))), high + 0.25 * spread)
+        if line.sd is None:
+            continue
+        sure = np.ones(len(line.values), bool) if line.source is None else line.source == MEASURED
+        for frames, most in ((sure, 0.75), (~sure, 0.25)):
+            edges = (line.values + 2.0 * np.outer((-1.0, 1.0), line.sd))[:, frames]
+            edges = np.clip(edges[np.isfinite(edges)], low - most * spread, high + most * spread)
+            bottom, top = float(np.min(edges, initial=bottom)), float(np.max(edges, initial=top))
+    low, high = bottom, top
     more = (0.2 if levels else _MARGIN) * (high - low)
     return low - more, high + more
 
@@ -196,7 +202,7 @@ def _labels(ticks: Array) -> list[str]:
     """With as many decimals as the step between them asks for."""
     step = float(np.min(np.diff(ticks))) if len(ticks) > 1 else abs(float(ticks[0])) if len(ticks) else 1.0
     decimals = 0
-    while decimals < 6 and abs(step * 10**decimals - round(step * 10**decimals)) > 1e-6 * 10**decimals:
+    while decimals < 12 and abs(step * 10**decimals - round(step * 10**decimals)) > 1e-3 * step * 10**decimals:
         decimals += 1
     return [f"{tick + 0.0:.{decimals}f}".replace("-", "−") for tick in ticks]
 

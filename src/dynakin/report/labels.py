@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dynakin.elements import element
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.naming import INERTIA_WORDS, words
 from dynakin.results.records import Parameter
 
@@ -47,6 +48,12 @@ def parameter_label(parameter: Parameter, marker_names: dict[str, str]) -> str:
         return f"{marker_names.get(owner, owner)} on the {words(parameter.segment)}, {last}"
     last = last or owner
     return f"{words(parameter.segment)} {INERTIA_WORDS.get(last, last)}"
+
+
+def since(estimate: Estimate) -> str:
+    """ " from 2 s on", behind a figure that leaves the first seconds out beside a curve that shows them; else ""."""
+    start = float(estimate.time[evaluation_window(estimate.time)][0])
+    return f" from {start:.4g} s on" if start > estimate.time[0] else ""
 
 
 def signed_percent(value: float) -> str:

@@ -67,7 +67,7 @@ class Settings(Strict, use_attribute_docstrings=True):
     """Table of inertial parameters: dumas, deleva, or a .csv file of your own."""
 
     mass_kg: float | None = Field(default=None, examples=[70.0])
-    """Body mass, kg. Not given: from the plates while the person stands still."""
+    """Body mass, kg. Not given: from the plates (quiet standing, squats, the impulse of a walk) or from the file."""
     height_m: float | None = Field(default=None, examples=[1.75])
     """Body height, m. Not given: from the markers, where a length needs it."""
     sex: Sex | None = Field(default=None, examples=["female"])
@@ -97,7 +97,8 @@ class Settings(Strict, use_attribute_docstrings=True):
     plate_filter_hz: float | None = Field(default=None, examples=[20.0])
     """Low-pass filter on the plates, Hz. Not given: only what resampling to the marker rate needs."""
     force_threshold_n: float | None = Field(default=None, examples=[10.0])
-    """Load below which a plate counts as empty, N. Not given: 10 N for plates that are resampled."""
+    """Load below which a plate counts as empty, N. Not given: 10 N for plates that are resampled and read
+    nothing while they are empty."""
 
     zero: Literal["model", "standing"] = "model"
     """Zero of the joint angles in angles.sto: model, or standing (in the static trial, else in the trial itself)."""

@@ -72,10 +72,16 @@ class Coverage:
         """By how many times the standard deviations are too small (overconfident) or too large, above 1."""
         return float(np.sqrt(max(self.mean_square, 1.0 / max(self.mean_square, 1e-300))))
 
+    @property
+    def seldom(self) -> dict[str, float]:
+        """Share of the frames of each element that has the truth in less than `INSIDE` of them."""
+        every = dict(zip(self.names, self.inside.tolist(), strict=True))
+        return {name: share for name, share in every.items() if share < INSIDE and self.inside_about_mean is not None}
+
     def sizes(self) -> str:
-        """What the judgement says of the standard deviations: `20 times too large`, `right`."""
+        """What the judgement says of the standard deviations: `20 times too large`, `right to a factor of 1.3`."""
         if self.judgement == "consistent":
-            return "right"
+            return f"right to a factor of {self.factor:.1f}"
         if self.judgement == "overconfident" and self.mean_square <= CONSISTENT[1]:
             return "too small for part of it"
         return f"{self.factor:.2g} times too {'small' if self.judgement == 'overconfident' else 'large'}"

@@ -139,7 +139,8 @@ class Systematic:
                 "scaling",
                 f"markers lie {1000.0 * moved_m:.0f} mm (mean) from where the model has them, of a model that "
                 f"fits the person at most {1000.0 * self.sizes.placed:.0f} mm: the centres of its joints count as "
-                f"{moved_m / self.sizes.placed:.1f} times less sure, and axes that are turned as well do not{locked}.",
+                f"{moved_m / self.sizes.placed:.1f} times less sure. Whether their axes are turned too the standard "
+                f"deviations do not hold{locked}.",
             )
         ]
 

@@ -74,7 +74,7 @@ def read_while_empty(push: Array) -> float:
 
 def part_pulling(push: Array) -> float:
     """Part of the samples (T,) in which a plate pulls by more than an offset does, as no plate in order can."""
-    return float(np.mean(np.nan_to_num(push) < -JUDGED_N))
+    return 0.0 if not len(push) else float(np.mean(np.nan_to_num(push) < -JUDGED_N))
 
 
 def plate_from_wrench(

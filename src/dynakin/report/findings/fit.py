@@ -82,6 +82,8 @@ def constants(estimate: Estimate, metrics: Metrics) -> list[Insight]:
     for group in (group for group in groups if group not in moving):
         title, change = sentence(group.title), number(group.largest_change_percent, digits=2)
         shrunk = f"the standard deviations ended at {100.0 * group.sd_left:.0f} % of where they began"
+        if group.title == "lengths" and any(p.skin_sd for p in estimate.parameters):
+            shrunk += ", not counting skin that follows a joint"
         if group.verdict == "untaught":
             source = "measured at the start" if group.title == "lengths" else "of the anthropometric table"
             text = (

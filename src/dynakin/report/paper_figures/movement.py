@@ -327,7 +327,8 @@ def repetitions_figure(
     of = f"n = {n}" if least == n else f"n = {least} to {n}"
     figure.supxlabel(f"{percent_label(shown[0].movement)}, {of}", fontsize=8, color=QUIET)
     styles = {style.label: style for plot in plots for style, _ in plot.curves}
-    key = [replace(style, label=label or "middle") for label, style in styles.items()]
+    named = (*(label for label in side_lines(estimate) if label in styles), *styles)
+    key = [replace(styles[label], label=label or "middle") for label in dict.fromkeys(named)]
     _key(figure, panels[0], key, band=_band_colour(key) if n > 1 else "", what=ONE_SD, columns=5)
     return figure
 

@@ -21,6 +21,11 @@ from dynakin.results.naming import number, sentence, shown_unit, words
 from dynakin.results.records import Parameter
 
 _KEY = (ESTIMATED_LINE, BOUND_LINE)
+_SETTLING = "How the filter settles on each length."
+_SMOOTHED = (
+    "Each length as all frames show it; it moves as far as its drift lets it. Masses, which do not drift, are one "
+    "number each, in the table of parameters."
+)
 
 
 def length_section(page: Page) -> Section:
@@ -29,15 +34,18 @@ def length_section(page: Page) -> Section:
     return Section(
         "lengths",
         "Segment lengths",
-        "How the filter settles on each length. A line on its bound says that the model does not fit there.",
+        f"{_SMOOTHED if page.estimate.smoothed else _SETTLING} A line on its bound says that the model does not fit "
+        "there.",
         [_path(page, p, words(element(p.name).owner), *_length_unit(p)) for p in lengths],
         lines=_KEY,
         band=BAND,
     )
 
 
-def mass_section(page: Page) -> Section:
-    """Segment masses over time between their bounds."""
+def mass_section(page: Page) -> Section | None:
+    """Segment masses over time between their bounds; none of a smoothed run, which has one value for all frames."""
+    if page.estimate.smoothed:
+        return None
     masses = [p for p in page.estimate.parameters if p.name.endswith("/mass") and p.kind == "inertia" and p.estimated]
     sides = " Limbs count both sides." if page.planar else ""
     return Section(
@@ -70,7 +78,8 @@ def _path(page: Page, p: Parameter, title: str, factor: float, unit: str) -> Pan
     levels = ((p.lower, "lower bound"), (p.upper, "upper bound"))
     bounds = [Bound(factor * v, word) for v, word in levels if v is not None and abs(v - middle) <= reach]
     line = Line(factor * path, ESTIMATED, 1.3, factor * sd)
-    return chart(sentence(title), unit, page.estimate.time, [line], note=note, bounds=bounds)
+    least = 4.0 * factor * float(np.nanmax(sd))  # the whole band is seen, and a line that does not move in it
+    return chart(sentence(title), unit, page.estimate.time, [line], note=note, bounds=bounds, least_range=least)
 
 
 def observability_section(page: Page) -> Section | None:
@@ -107,13 +116,18 @@ def observability_section(page: Page) -> Section | None:
         "Observability",
         "Posterior against prior: the whole line is each constant’s standard deviation before the first frame, the "
         f"blue part that after the last. Up to the first mark ({KNOWN:g}) a value is the data’s, from the second "
-        f"({NOTHING:g}) on it is the prior’s. A base parameter is named after one of the numbers in it.",
+        f"({NOTHING:g}) on it is the prior’s. {_WITHOUT_SKIN if 'Lengths' in groups else ''}A base parameter is named "
+        "after one of the numbers in it.",
         wide=[_panel(rows) for rows in (left, right) if rows],
         notes=(*posterior_in_words(estimate), *_base_sentence(block)),
         parts=parts,
     )
 
 
+_WITHOUT_SKIN = (
+    "Of lengths it is what the filter sees: skin that follows a joint looks like a length, and is in the bands above "
+    "and in the table of parameters. "
+)
 _BASE = (
     "The ground reaction depends on the segments’ inertia through these sums only: what leaves them as they are, no "
     "movement can identify."

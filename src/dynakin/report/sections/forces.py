@@ -8,7 +8,7 @@ import numpy as np
 
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.report.chart import Line, chart
-from dynakin.report.labels import COMPONENT_LABELS
+from dynakin.report.labels import COMPONENT_LABELS, since
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import side_key
 from dynakin.report.styles import BAND, ESTIMATED, ESTIMATED_LINE, MEASURED, MEASURED_LINE, SIDE_COLOURS, source_key
@@ -38,7 +38,8 @@ def wrench_section(page: Page) -> Section | None:
         component = COMPONENTS[k]
         title, unit = COMPONENT_LABELS[component]
         rms = page.metrics["wrench"]["rms"].get(component)
-        note = f"{component}, RMS difference {number(rms, unit)}" if rms is not None else component
+        difference = f", RMS difference {number(rms, unit)}{since(page.estimate)}"
+        note = component if rms is None else component + difference
         lines = [Line(measured[:, k], MEASURED, 2.6), Line(estimated[:, k], ESTIMATED, 1.0, source=source[:, k])]
         panels.append(chart(title, unit, page.estimate.time, lines, note=note))
     return Section(
@@ -147,7 +148,7 @@ def _peak(estimate: Estimate, foot: str, values: np.ndarray, unit: str) -> str:
         return "no stance measured from end to end, so no peak"
     peak = max(float(np.abs(part).max()) for part in known)
     per_kg = f", {number(peak / estimate.mass_kg, 'N/kg')}" if estimate.mass_kg else ""
-    return f"peak {number(peak, unit)}{per_kg}"
+    return f"peak {number(peak, unit)}{per_kg}{since(estimate)}"
 
 
 def mass_centre_section(page: Page) -> Section | None:

@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from dynakin.report.chart import Line, Panel, band_is_too_wide, chart
-from dynakin.report.labels import moment_note
+from dynakin.report.labels import moment_note, since
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import REGIONS, Joint, joints_of, normalising_mass, side_key, side_lines
 from dynakin.report.styles import BAND, source_key
-from dynakin.results.measures.angles import convention_of, reported
+from dynakin.results.measures.angles import reported, way_of
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, UNKNOWN, moment_sources
 from dynakin.results.naming import listed, number, sentence
 
@@ -29,8 +29,7 @@ def angle_section(page: Page) -> Section:
 
     def draw(joint: Joint) -> Panel:
         factor, unit = (180.0 / np.pi, "deg") if joint.rotation else (1000.0, "mm")
-        name = estimate.coordinate_names[next(iter(joint.columns.values()))]
-        found = convention_of(name) if joint.rotation else None
+        one = next(iter(joint.columns.values()))
         ranges, lines = [], []
         for side, k in joint.columns.items():
             own = factor * values[:, k]
@@ -42,11 +41,7 @@ def angle_section(page: Page) -> Section:
             lines.append(Line(own, lines_of[side].colour, 1.2, band))
             moved = f"{number(low)} to {number(high)}" if high > low else f"locked at {number(low, unit)}"
             ranges.append(f"{f'{side} ' if side else ''}{moved}{wide}")
-        title = joint.title
-        if found:
-            turned = sign[next(iter(joint.columns.values()))]
-            way = found[0].positive if turned == found[0].sign else found[0].negative
-            title = f"{title} (+ {way})"
+        title = joint.title + (way_of(estimate.coordinate_names[one], sign[one]) if joint.rotation else "")
         least = 2.0 if joint.rotation else 10.0
         return chart(title, unit, estimate.time, lines[::-1], note="; ".join(ranges), least_range=least)
 
@@ -75,7 +70,7 @@ def moment_section(page: Page) -> Section:
 
     def draw(joint: Joint) -> Panel | None:
         unit = ("N m" if joint.rotation else "N") + ("/kg" if mass else "")
-        notes, lines = [], []
+        notes, lines, ranged = [], [], False
         for side, k in joint.columns.items():
             who, name = f"{side} " if side else "", estimate.coordinate_names[k]
             if not np.isfinite(moments[:, k]).any():
@@ -85,12 +80,16 @@ def moment_section(page: Page) -> Section:
             lines.append(Line(moments[:, k], lines_of[side].colour, 1.2, band, source[:, k]))
             if peaks and name in peaks:
                 notes.append(f"{who}{_two_digits(peaks[name]['smallest'])} to {_two_digits(peaks[name]['largest'])}")
+                ranged = True
             elif peaks is not None:
                 notes.append(f"{who}no whole measured stance")
             elif about := f"{moment_note(estimate, name)}{wide}".strip():
                 notes.append(about)
-        note = "; ".join(notes)
-        return chart(joint.name, unit, estimate.time, lines[::-1], note=note, least_range=0.02) if lines else None
+        if not lines:
+            return None
+        note = "; ".join(notes) + (since(estimate) if ranged else "")
+        title = joint.name + (way_of(name) if joint.rotation else "")
+        return chart(title, unit, estimate.time, lines[::-1], note=note, least_range=0.02)
 
     joints = [joint for joint in joints_of(estimate) if joint.region != "Whole body"]
     panels, parts = _by_region("moments", joints, draw)

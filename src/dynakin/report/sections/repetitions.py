@@ -13,7 +13,7 @@ from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import Joint, joints_of, side_key, side_lines
 from dynakin.report.styles import ESTIMATED_LINE, MEASURED_LINE, LineStyle, method_styles
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.angles import reported
+from dynakin.results.measures.angles import reported, way_of
 from dynakin.results.measures.mean_curves import MEASURED, PERCENT, MeanCurve
 from dynakin.results.measures.repetitions import Found
 from dynakin.results.naming import listed, sentence, words
@@ -58,8 +58,9 @@ def side_plots(estimate: Estimate, curves: Sequence[MeanCurve]) -> tuple[dict[st
     own = {(curve.side, curve.quantity): curve for curve in curves if curve.method.startswith("EKF")}
     joints = [joint for joint in joints_of(estimate) if joint.region in ("Legs", "Trunk and head")]
     styles, ways = side_lines(estimate), reported(estimate).way
-    angles = [_sides(joint, own, "", styles, ways) for joint in joints]
-    moments = {joint.name.lower(): _sides(joint, own, "/moment", styles, ways) for joint in joints}
+    names = estimate.coordinate_names
+    angles = [_sides(joint, own, "", styles, ways, names) for joint in joints]
+    moments = {joint.name.lower(): _sides(joint, own, "/moment", styles, ways, names) for joint in joints}
     wrench = [curve for curve in curves if curve.quantity in COMPONENTS and curve.method.startswith(("EKF", MEASURED))]
     plots = {
         "angles": [plot for plot in angles if plot],
@@ -157,6 +158,7 @@ def _title(curve: MeanCurve) -> str:
     """`Knee`, with the foot where each has its own cycles."""
     name = curve.quantity.removesuffix("/moment")
     text = COMPONENT_LABELS[name][0] if name in COMPONENT_LABELS else sentence(words(name))
+    text += way_of(name) if kind_of(curve) == "moments" else ""
     return text if curve.side == "both" else f"{text}, {curve.side} cycle"
 
 
@@ -175,6 +177,7 @@ def _sides(
     suffix: str,
     styles: Mapping[str, LineStyle],
     ways: Sequence[str],
+    names: Sequence[str],
 ) -> Plot | None:
     drawn = []
     for side in joint.columns:
@@ -186,7 +189,8 @@ def _sides(
     if not any(curve.n.any() for _, curve in drawn):
         return None
     note = "; ".join(f"{f'{side}: ' if side else ''}{curve.times}" for side, curve in drawn)
-    title = joint.title + ("" if suffix else ways[next(iter(joint.columns.values()))])
+    one = next(iter(joint.columns.values()))
+    title = joint.name + way_of(names[one]) if suffix else joint.title + ways[one]
     return Plot(title, note, [(styles[side], curve) for side, curve in drawn if curve.n.any()][::-1])
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from dynakin.report.chart import Line, Panel, chart
+from dynakin.report.labels import since
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import Joint, joints_of, normalising_mass, side_key, side_lines
 from dynakin.report.styles import source_key
@@ -43,6 +44,7 @@ def power_section(page: Page) -> Section | None:
             for side, k in joint.columns.items()
             if (own := work.get(_name(estimate, k)))
         )
+        note += since(estimate) if note else ""
         shown = chart(joint.name, unit, estimate.time, lines[::-1], note=note, least_range=0.05)
         (legs if joint.region == "Legs" else others).append(shown)
     window = page.metrics["window"]

@@ -57,6 +57,17 @@ def convention_of(coordinate: str) -> tuple[Convention, str] | None:
     return None if found is None else (found, side)
 
 
+def way_of(coordinate: str, sign: float = 1.0) -> str:
+    """ " (+ flexion)": which way a coordinate grows, or the moment that turns it so; "" where it has no clinical name.
+
+    Args:
+        sign: of what is shown against the model's.
+    """
+    if (found := convention_of(coordinate)) is None:
+        return ""
+    return f" (+ {found[0].positive if sign == found[0].sign else found[0].negative})"
+
+
 def mean_angles(names: Sequence[str], rotation: npt.NDArray[np.bool_], coordinates: Array) -> dict[str, float]:
     """Mean over the frames of coordinates (T, C) of each that is a rotation, rad."""
     return {n: float(v) for n, v, turns in zip(names, coordinates.mean(axis=0), rotation, strict=True) if turns}

@@ -76,7 +76,8 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         "unknown_frames": int((codes == sources.ABSENT).any(axis=1).sum()),
         "left_at_root": left,
     }
-    return figures | {"verdict": _words(figures, int(grounded.sum()), len(contact), FLIGHT * weight)}
+    frames = (int(judged.sum()), int(grounded.sum()), len(contact))
+    return figures | {"verdict": _words(figures, frames, FLIGHT * weight)}
 
 
 def contact_figures(estimate: Estimate) -> dict[str, Any]:
@@ -144,14 +145,20 @@ def _largest(wrench: np.ndarray, least_n: np.ndarray | None = None) -> dict[str,
     return found if least_n is None else found | {"share": float(np.nanmax(force / least_n[known], initial=0.0))}
 
 
-def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float) -> str:
-    """What is said goes by the numbers: nothing is left only where nothing is."""
+def _words(figures: dict[str, Any], counts: tuple[int, int, int], weight_n: float) -> str:
+    """What is said goes by the numbers: nothing is left only where nothing is.
+
+    Args:
+        counts: frames that are judged, those in which all contacts are measured (at the ends too), and all.
+    """
     left, text = figures["left_at_root"], []
+    judged, grounded, frames = counts
     if left["grounded"] is None:
         where = "In no frame" if not grounded else "In no frame but those at the recording's ends"
         text.append(f"{where} are all contacts with the ground measured: the residual at the root is not known.")
     else:
-        where = f"in the {grounded} of {frames} frames in which every contact with the ground is measured"
+        ends = ", those at the ends left out" if judged < grounded else ""
+        where = f"in the {judged} of {frames} frames in which every contact with the ground is measured{ends}"
         if max(left["grounded"].values()) <= ROUNDING:
             changed = [
                 f"{name} foot {max(own['fx'], own['fy'], own['fz']):.1f} N and "

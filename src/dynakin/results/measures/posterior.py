@@ -65,7 +65,7 @@ def posterior_figures(estimate: Estimate) -> dict[str, Any]:
         "parameters": {
             name: {
                 "prior_sd": by_name[name].prior_sd,
-                "sd": by_name[name].sd,
+                "sd": by_name[name].posterior_sd,
                 "share": share,
                 "judgement": judged(share),
             }

@@ -237,14 +237,16 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
         lost: the sentence on frames in which the person was lost.
     """
     said = [str(text) for text in estimate.config.get("ground", {}).get("reasons", [])]
-    return source_figures(estimate.data, moment_sources(estimate.data), [*said, *([lost] if lost else [])])
+    reasons = [*said, *([lost] if lost else [])]
+    return source_figures(estimate.data, moment_sources(estimate.data), reasons, plates=bool(estimate.recording.plates))
 
 
-def source_figures(data: xr.Dataset, sources: Codes, reasons: Sequence[str]) -> dict[str, Any]:
+def source_figures(data: xr.Dataset, sources: Codes, reasons: Sequence[str], *, plates: bool) -> dict[str, Any]:
     """`moment_figures` of codes (T, C).
 
     Args:
         data: with the coordinates of an estimate; none of its variables is read. reasons: sentences.
+        plates: whether there are any; without any, what is known is of a foot in the air.
     """
     groups = _groups(data)
     legs = {name: _count(sources[:, columns].max(axis=1)) for name, columns in groups.items()}
@@ -262,7 +264,7 @@ def source_figures(data: xr.Dataset, sources: Codes, reasons: Sequence[str]) -> 
         "legs": legs,
         "coordinates": {name: _count(sources[:, k]) for k, name in enumerate(names)},
         "reasons": list(dict.fromkeys(why)),
-        "verdict": _words({leg: _by_joint(sources, names, own) for leg, own in spoken.items()}, len(sources)),
+        "verdict": _words({leg: _by_joint(sources, names, own) for leg, own in spoken.items()}, len(sources), plates),
     }
 
 
@@ -299,12 +301,12 @@ def _by_joint(sources: Codes, names: list[str], columns: list[int]) -> dict[str,
     return {joint: _count(sources[:, own].max(axis=1)) for joint, own in joints.items()}
 
 
-def _words(legs: dict[str, dict[str, dict[str, int]]], frames: int) -> str:
+def _words(legs: dict[str, dict[str, dict[str, int]]], frames: int, plates: bool) -> str:
     """By leg, and by joint where these differ, those that are measured longest first."""
     what = "Moments" if "" in legs else "Leg moments"
     for meaning in MEANINGS:
         if all(count[meaning] == frames for joints in legs.values() for count in joints.values()):
-            return f"{what}: {_how(meaning)} in all {frames} frames."
+            return f"{what}: {_how(meaning, plates)} in all {frames} frames."
     each, of = [], f" of {frames} frames"
     for leg, joints in legs.items():
         alike: dict[tuple[int, ...], list[str]] = {}
@@ -315,14 +317,16 @@ def _words(legs: dict[str, dict[str, dict[str, int]]], frames: int) -> str:
             said = []
             for meaning, number in zip(MEANINGS, counts, strict=True):
                 if number or (meaning == "measured" and not any(counts)):
-                    said.append(f"{_how(meaning)} in {number}{of}")
+                    said.append(f"{_how(meaning, plates)} in {number}{of}")
                     of = ""
             parts.append((f"{listed(names)} " if len(alike) > 1 else "") + listed(said))
         each.append(f"{leg}{':' if leg and len(alike) > 1 else ''} {', '.join(parts)}".strip())
     return f"{what}: {'; '.join(each)}."
 
 
-def _how(meaning: str) -> str:
+def _how(meaning: str, plates: bool) -> str:
+    if meaning == "measured" and not plates:
+        return "known (in the air)"
     return {"derived": "derived from the motion", "prior": "estimated with a prior"}.get(meaning, meaning)
 
 

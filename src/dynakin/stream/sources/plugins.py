@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 from dynakin.errors import ConfigError
+from dynakin.recordings.read import READERS
 from dynakin.settings.strict import nearest
 
 SOURCES, SINKS = "dynakin.sources", "dynakin.sinks"
@@ -27,6 +29,8 @@ def plugin(group: str, text: str, **more: str) -> Any:
     address, *parts = rest.split(",")
     options = {key.strip(): value.strip() or "yes" for key, _, value in (part.partition("=") for part in parts)}
     entries = {entry.name: entry for entry in metadata.entry_points(group=group)}
+    if kind not in entries and group == SOURCES and text == kind and Path(text).suffix.casefold() in READERS:
+        raise ConfigError(f"{text!r} is a file, expected replay:{text}")
     if kind not in entries:
         known = sorted(entries)
         raise ConfigError(
