@@ -21,6 +21,7 @@ from dynakin.filter.ground import axes
 from dynakin.filter.ground.carried import _presses_there, _taken_up, more_than_the_mass
 from dynakin.filter.ground.delay import Delay, brought_into_step, plates_delay
 from dynakin.filter.ground.fine_delay import UNKNOWN_S
+from dynakin.filter.ground.gain import fitting_rate
 from dynakin.filter.ground.mass_centre import MassCentre
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_errors import PlateErrors
@@ -462,6 +463,23 @@ def test_of_a_real_walk_the_rate_is_told_and_of_a_good_one_nothing(data_dir: Pat
         said = [message.text for message in about(person().prepare(faster(walk, factor)).messages, "rate")]
         assert len(said) == (factor != 1.0)
         assert not said or "Hz: by the plates" in said[0]
+
+
+@pytest.mark.parametrize(("pelvis_m", "slope", "told"), [(0.02, 1.4, True), (0.001, 1.4, False), (0.001, 2.0, True)])
+def test_a_leg_that_kicks_and_weighs_more_than_by_the_table_is_no_wrong_rate(
+    pelvis_m: float, slope: float, told: bool
+) -> None:
+    """The pelvis hardly moves then, out of step; "about 119 Hz would fit" was said of four kicks at 100 Hz."""
+    needed = Needed.__new__(Needed)
+    needed.time = np.arange(400) / 100.0
+    needed.rate, needed.weight, needed.whole, needed.known = 100.0, 600.0, True, np.ones(400, dtype=bool)
+    turn = 2.0 * np.pi * needed.time
+    up, side = 60.0 * np.sin(turn), np.zeros(400)
+    needed.force = np.stack([side, 600.0 + up, side], axis=1)
+    needed.root = np.stack([side, 1.0 - pelvis_m * np.sin(turn) + 0.002 * np.cos(turn), side], axis=1)
+    found = fitting_rate(needed, np.stack([side, 600.0 + slope * up, side], axis=1))
+    assert (found is not None) == told
+    assert found is None or found[0] == pytest.approx(100.0 * np.sqrt(slope))
 
 
 @pytest.mark.parametrize("seconds", [(0.0, 14.0), (5.0, 8.0), (0.3, 1.5)])
