@@ -92,9 +92,10 @@ def test_angles_follow_the_zero_and_the_signs_that_were_asked_for(spatial: Estim
 def test_moments_are_per_kg_and_derived_ones_dashed(spatial: Estimate, metrics: dict[str, Any]) -> None:
     section = moment_section(Page(spatial, metrics))
     knee, hip = section.parts[0].panels[1], section.parts[0].panels[0]
-    assert knee.note == "right −1.50 to 0.00; left −0.75 to 0.00 from 2 s on"  # the curve is from 0 s on
+    assert knee.note == "right −1.50 to 0.00; left −0.75 to 0.00"
     assert knee.title == "Knee (+ flexion)"
     assert "stroke-dasharray" in knee.svg and knee.svg.count("stroke-dasharray") == 1  # the left one only
+    assert section.text.endswith(" Numbers above panels are from 2 s on.")  # the curves are from 0 s on
     assert "N m/kg</text>" in hip.svg
     assert section.text.startswith(
         "Leg moments: right: knee measured in 601 of 601 frames, hip measured in 551 and absent in 50; left: knee "

@@ -51,9 +51,9 @@ def parameter_label(parameter: Parameter, marker_names: dict[str, str]) -> str:
 
 
 def since(estimate: Estimate) -> str:
-    """ " from 2 s on", behind a figure that leaves the first seconds out beside a curve that shows them; else ""."""
+    """A sentence for a section whose numbers leave the first seconds out beside curves that show them; else ""."""
     start = float(estimate.time[evaluation_window(estimate.time)][0])
-    return f" from {start:.4g} s on" if start > estimate.time[0] else ""
+    return f" Numbers above panels are from {start:.4g} s on." if start > estimate.time[0] else ""
 
 
 def signed_percent(value: float) -> str:

@@ -38,14 +38,13 @@ def wrench_section(page: Page) -> Section | None:
         component = COMPONENTS[k]
         title, unit = COMPONENT_LABELS[component]
         rms = page.metrics["wrench"]["rms"].get(component)
-        difference = f", RMS difference {number(rms, unit)}{since(page.estimate)}"
-        note = component if rms is None else component + difference
+        note = component if rms is None else f"{component}, RMS difference {number(rms, unit)}"
         lines = [Line(measured[:, k], MEASURED, 2.6), Line(estimated[:, k], ESTIMATED, 1.0, source=source[:, k])]
         panels.append(chart(title, unit, page.estimate.time, lines, note=note))
     return Section(
         "wrench",
         "Ground reaction",
-        _IN_A_PLANE if page.planar else _IN_SPACE,
+        (_IN_A_PLANE if page.planar else _IN_SPACE) + since(page.estimate),
         panels,
         lines=(MEASURED_LINE, ESTIMATED_LINE, *source_key(source[:, shown])),
     )
@@ -69,7 +68,7 @@ def foot_section(page: Page) -> Section | None:
     return Section(
         "feet",
         "Feet",
-        figures["verdict"],
+        figures["verdict"] + since(estimate),
         lines=(MEASURED_LINE, *side_key(estimate), *source_key(foot_sources(estimate.data))),
         band=BAND if "foot_wrench_sd" in estimate.data else "",
         tables=[table for table in (_adjustments(figures),) if table.rows],
@@ -148,7 +147,7 @@ def _peak(estimate: Estimate, foot: str, values: np.ndarray, unit: str) -> str:
         return "no stance measured from end to end, so no peak"
     peak = max(float(np.abs(part).max()) for part in known)
     per_kg = f", {number(peak / estimate.mass_kg, 'N/kg')}" if estimate.mass_kg else ""
-    return f"peak {number(peak, unit)}{per_kg}{since(estimate)}"
+    return f"peak {number(peak, unit)}{per_kg}"
 
 
 def mass_centre_section(page: Page) -> Section | None:

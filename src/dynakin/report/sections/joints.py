@@ -70,7 +70,7 @@ def moment_section(page: Page) -> Section:
 
     def draw(joint: Joint) -> Panel | None:
         unit = ("N m" if joint.rotation else "N") + ("/kg" if mass else "")
-        notes, lines, ranged = [], [], False
+        notes, lines = [], []
         for side, k in joint.columns.items():
             who, name = f"{side} " if side else "", estimate.coordinate_names[k]
             if not np.isfinite(moments[:, k]).any():
@@ -80,16 +80,14 @@ def moment_section(page: Page) -> Section:
             lines.append(Line(moments[:, k], lines_of[side].colour, 1.2, band, source[:, k]))
             if peaks and name in peaks:
                 notes.append(f"{who}{_two_digits(peaks[name]['smallest'])} to {_two_digits(peaks[name]['largest'])}")
-                ranged = True
             elif peaks is not None:
                 notes.append(f"{who}no whole measured stance")
             elif about := f"{moment_note(estimate, name)}{wide}".strip():
                 notes.append(about)
         if not lines:
             return None
-        note = "; ".join(notes) + (since(estimate) if ranged else "")
         title = joint.name + (way_of(name) if joint.rotation else "")
-        return chart(title, unit, estimate.time, lines[::-1], note=note, least_range=0.02)
+        return chart(title, unit, estimate.time, lines[::-1], note="; ".join(notes), least_range=0.02)
 
     joints = [joint for joint in joints_of(estimate) if joint.region != "Whole body"]
     panels, parts = _by_region("moments", joints, draw)
@@ -112,7 +110,7 @@ def moment_section(page: Page) -> Section:
     return Section(
         "moments",
         "Joint moments",
-        " ".join(text),
+        " ".join(text) + (since(estimate) if peaks else ""),
         panels,
         lines=(*side_key(estimate), *source_key(source)) if shown else (),
         band=BAND if sd is not None and shown else "",

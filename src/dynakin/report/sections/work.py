@@ -44,7 +44,6 @@ def power_section(page: Page) -> Section | None:
             for side, k in joint.columns.items()
             if (own := work.get(_name(estimate, k)))
         )
-        note += since(estimate) if note else ""
         shown = chart(joint.name, unit, estimate.time, lines[::-1], note=note, least_range=0.05)
         (legs if joint.region == "Legs" else others).append(shown)
     window = page.metrics["window"]
@@ -54,7 +53,7 @@ def power_section(page: Page) -> Section | None:
         "Powers and work",
         "Moment times speed: positive where energy is added to the body. Work is the sum of its positive and of its "
         "negative parts. Peaks and work are those of measured moments: where a leg’s are not measured throughout, of "
-        "its stances and swings that are measured from end to end.",
+        f"its stances and swings that are measured from end to end.{since(estimate)}",
         legs or others,
         folded=others if legs else [],
         folded_title="Powers of trunk and arms",
