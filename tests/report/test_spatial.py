@@ -124,7 +124,7 @@ def test_work_and_symmetry_tables_hold_the_metrics(spatial: Estimate, metrics: d
     assert float(knee[2]) == pytest.approx(metrics["work"]["knee_angle_r"]["positive_j"], rel=0.01)
     tables = {table.title: table for table in shown(asymmetry_section(Page(spatial, metrics))).tables}
     rows = {row[0]: row for row in tables["Legs: symmetry index, %"].rows}
-    assert rows["Knee angle"][1] == "+67"  # (80 - 40) / 60
+    assert rows["Knee"][1] == "+67"  # (80 - 40) / 60
     assert rows["Hip flexion"][1] == "0"
     assert tables["Feet: symmetry index, %"].rows[0][1] == "0"
 

@@ -93,7 +93,7 @@ def asymmetry_section(page: Page) -> Section | None:
             if joint.region == region and joint.stem in found["coordinates"]:
                 own = found["coordinates"][joint.stem]
                 rows.append(
-                    (joint.title, *(_percent(own[key], key in found["small"].get(joint.stem, ())) for key in keys))
+                    (joint.name, *(_percent(own[key], key in found["small"].get(joint.stem, ())) for key in keys))
                 )
         if rows:
             headings = ("", "range", "peak moment", "positive work", "negative work")
