@@ -162,6 +162,17 @@ def test_plates_that_are_given_to_the_other_foot_are_not_believed_live(step_m: f
             np.testing.assert_array_equal(found[frame].on, believed[frame].on)
 
 
+def test_a_sample_without_plates_does_not_end_the_doubt() -> None:
+    feet = {side: [replace(s, plates=(side,)) for s in own] for side, own in walk(6, 0.0).items()}
+    made = steps(lasting(6), feet, [MadePlate("right"), MadePlate("left")])
+    gap = [replace(p, force=p.force.copy()) for p in made.recording.plates]
+    for plate in gap:
+        plate.force[20] = np.nan
+    said: list[str] = []
+    live(replace(made, recording=replace(made.recording, plates=tuple(gap))), {"right": "left", "left": "right"}, said)
+    assert len([text for text in said if text.startswith("plates:")]) == 2
+
+
 def test_stance_rises_and_falls_live() -> None:
     feet = walk(6, 0.6)
     plates = [

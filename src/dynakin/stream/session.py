@@ -158,9 +158,10 @@ class Live:
                 self._turn()
             self._take(np.inf)
             if self._reader.over and self._tracker is None:
+                in_all = max(self.standing_s, self.standing_wait_s)
                 raise StreamError(
                     f"the streams ended before the model was measured: {self._came_s:.1f} s came, expected "
-                    f"{self.standing_s:g} s of standing, or {self.standing_wait_s:g} s in all, after which the "
+                    f"{self.standing_s:g} s of standing, or {in_all:g} s in all, after which the "
                     "quietest moment is taken (standing_wait_s in Python, --standing-wait)"
                 )
         finally:
@@ -227,7 +228,7 @@ class Live:
         self._take(now)
         if now - self._asked > _ASK_S:
             self._asked = now
-            for wish in self.sinks.asked():
+            for wish in dict.fromkeys(self.sinks.asked()):  # a double click is one wish
                 if wish in ("restart", "recalibrate", "stop"):
                     getattr(self, wish)()
             if self._monitor is not None and self._running and not self._reader.over:

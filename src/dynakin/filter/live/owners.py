@@ -87,7 +87,7 @@ class PlateOwners:
         self._near += touches[:, None] & loaded & near
         mine = self._majority() & bears[:, None]
         for p, plate in enumerate(plates):
-            push = float(plate.wrench[0, 1])
+            push = float(plate.push[0])
             if push <= UNLOADED_N:
                 self._owners[:, p] = False
                 self._between[p] = self._judged[p] = 0
@@ -106,7 +106,7 @@ class PlateOwners:
         dt = float(np.clip(stances.time_s - self._before_s, *DT_S)) if np.isfinite(self._before_s) else 0.0
         self._before_s = stances.time_s
         for p, foot in list(self._assigned.items()):
-            push = float(plates[p].wrench[0, 1])
+            push = float(plates[p].push[0])  # 0 where it is not known
             if push <= JUDGED_N:
                 continue
             elsewhere = loaded & (np.arange(len(plates)) != p)  # who stands on another plate is no witness

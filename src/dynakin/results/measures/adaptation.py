@@ -196,7 +196,7 @@ def _verdict(constants: dict[str, dict[str, Any]], misfits: dict[str, Settling])
     return f"The estimate has settled after {after[latest]:.1f} s (the paper allows 2 s): until then {why}."
 
 
-# A constant that still moves by more than that in the last quarter, and by more than its own deviation, has not
+# A constant that still moves by more than that in the last quarter, and by more than `WITHIN_SD`, has not
 # settled. By truth (a walk of `truth3d`, live-like) twenty masses move by 1 to 9 %, all by less than their deviations,
 # and those of moments hold 92 to 93 % of their errors: that they move says nothing.
 MOVING = BAND

@@ -123,21 +123,17 @@ def lost_in_words(estimate: Estimate) -> str:
 
 
 def why_lost(estimate: Estimate) -> str | None:
-    """Why a trial as a whole is no estimate, with what was doubted of the person and the labels before, which is often
-    the cause; None where it is one."""
+    """Why a trial as a whole is no estimate, in one clause; None where it is one."""
     found = estimate.tracking
     if found is None:
         return None
     share = lost_share(found)
     if share <= MOST_LOST:
         return None
-    doubted = warnings_of(about(estimate.messages, "calibration", "labels"))
-    text = (
+    return (
         f"{in_words(estimate, found)[:-1]}. That is {100.0 * share:.0f} % of the frames with markers, expected "
         f"{100.0 * MOST_LOST:.0f} % at most"
     )
-    before = "; ".join(message.text.removesuffix(".") for message in doubted)
-    return f"{text}. What was doubted before: {before}" if before else text
 
 
 def refuse_lost(estimate: Estimate, keep: str | None = None) -> None:
@@ -153,10 +149,11 @@ def refuse_lost(estimate: Estimate, keep: str | None = None) -> None:
         where = estimate.recording.path or estimate.recording.name
         good = bool((found.measured & ~found.lost).any())
         hint = f" ({keep} saves the frames that are good)" if keep and good else ""
-        raise LostError(
-            f"{where}: {reason}; {'' if good else 'no frame is good, '}nothing is saved{hint}. Look whether labels are "
-            "swapped, or the person bends a joint that this model does not have"
-        )
+        doubted = [message.text for message in warnings_of(about(estimate.messages, "calibration", "labels"))]
+        look = "Look whether labels are swapped, or the person bends a joint that this model does not have"
+        if doubted:  # often the cause
+            look = f"What was doubted before: {' '.join(doubted)}"
+        raise LostError(f"{where}: {reason}; {'' if good else 'no frame is good, '}nothing is saved{hint}. {look}")
 
 
 def tracking_figures(estimate: Estimate) -> dict[str, Any] | None:

@@ -58,9 +58,13 @@ class Page:
 
     def begin(self, setup: dict[str, Any]) -> None:
         """A model was measured."""
+        try:
+            latest = Latest(sum(setup["sizes"].values()), path=setup["path"])
+        except FileNotFoundError:  # the session has begun anew since: its next setup is on the way
+            return
         if self.latest is not None:
             self.latest.close()
-        self.setup, self.latest = setup, Latest(sum(setup["sizes"].values()), path=setup["path"])
+        self.setup, self.latest = setup, latest
         self.history.clear()
         scene = self.server.scene
         bones = len(setup["bones"]) + len(setup["ends"])
