@@ -309,6 +309,22 @@ def test_a_seat_on_the_plate_of_the_feet_bears_and_leaves_no_moment_there() -> N
     assert not any("derived from the motion" in text for text in said)
 
 
+def test_a_seat_on_the_plate_of_the_feet_is_no_plate_off_its_place() -> None:
+    """Of a declared seat "248 mm away from the nearest foot ... declare what else does" was said, where the person sat
+    still at first."""
+    recording = sit(1, "all").recording
+    seat = recording.plates[2]
+    behind = np.cross([-0.25, 0.0, 0.0], np.nan_to_num(seat.force))
+    force, moment = (np.sum([np.nan_to_num(getattr(p, kind)) for p in recording.plates], axis=0) for kind in KINDS)
+    moment = moment + behind
+    cop = np.stack([moment[:, 2], np.zeros(len(force)), -moment[:, 0]], axis=1) / force[:, [1]]
+    one = Plate("one", force, moment, cop, moment - np.cross(cop, force), None)
+    ready = dynakin.Estimator(person(), contacts=["seat"]).prepare(recording.with_plates((one,)).window(4.2, 6.6))
+    said = [message.text for message in ready.messages]
+    assert any("one presses beyond both feet" in text for text in said)
+    assert not any("from the nearest foot" in text for text in said)
+
+
 def test_contacts_of_a_configuration_come_back(tmp_path: Path) -> None:
     given = {
         "model": "fullbody",

@@ -31,7 +31,27 @@ CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
 RATE = np.array([-900.0, 4000.0, 300.0, 200.0, 100.0, 700.0])
 """By how much the contact changes, N and N m a second."""
-SIZES = (0.01, 0.02, 0.025, 0.03, 0.05, 0.04, 0.06, 0.065, 0.07, 0.09, 0.012, 0.008, 0.3, 0.015, 0.5, 0.004, 2.0, 0.7)
+SIZES = (
+    0.01,
+    0.011,
+    0.02,
+    0.025,
+    0.03,
+    0.05,
+    0.04,
+    0.06,
+    0.065,
+    0.07,
+    0.09,
+    0.012,
+    0.008,
+    0.3,
+    0.015,
+    0.5,
+    0.004,
+    2.0,
+    0.7,
+)
 MOVING, MOMENTS_MOVING, OFF_PLATES = 0.1, 0.05, 0.2
 NONE = Sizes(
     *np.zeros(len(SIZES) - 2),

@@ -130,7 +130,8 @@ def check_plates(
             continue
         hidden = [name for name, own in (foot_markers or {}).items() if not own]
         refused = len(findings.refusals)
-        foot = _check_pressure(plate, loaded, feet, _owner(loads, loaded, p), ground, hidden, findings)
+        pressed = _by_feet(plate, loaded, loads, p, ground)
+        foot = _check_pressure(plate, pressed, feet, _owner(loads, pressed, p), ground, hidden, findings)
         if len(findings.refusals) > refused:
             under_no_foot = under_no_foot or plate.name
         _check_height(plate, loaded, places, recording.rate, ground, findings)
@@ -269,6 +270,17 @@ def _owner(loads: FootLoads, frames: np.ndarray, p: int) -> str | None:
     counts = loads.on[frames, :, p].sum(axis=0)
     most = int(np.argmax(counts)) if len(counts) else 0
     return loads.feet[most] if len(counts) and counts[most] > 0.5 * len(frames) else None
+
+
+def _by_feet(plate: Plate, loaded: np.ndarray, loads: FootLoads, p: int, ground: GroundFrame) -> np.ndarray:
+    """Those of the frames in which nothing else bears on a plate under both feet, which the assignment has said (a seat
+    on it, say); of the whole recording where that leaves none, and all of them where it has none either."""
+    else_too = loads.elsewhere & (loads.on[:, :, p].sum(axis=1) > 1)
+    push = np.abs(np.nan_to_num(ground.vectors_to_ground(plate.force)[:, 1]))
+    for frames in (loaded, np.flatnonzero(push > JUDGED_N)):
+        if len(free := frames[~else_too[frames]]):
+            return np.asarray(free)
+    return loaded
 
 
 def _check_pressure(

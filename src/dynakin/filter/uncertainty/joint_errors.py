@@ -22,6 +22,7 @@ from dynakin.model.spec import free_coordinates, free_names
 
 Kind = Literal[
     "hinge_centre",
+    "elbow_centre",
     "ball_centre",
     "spine_centre",
     "ball_across",
@@ -33,10 +34,10 @@ Kind = Literal[
     "frame_tilt",
     "root_origin",
 ]
-"""The centre of a joint with one or two axes (hinge) off where it is on its bones, or with three (ball; the spine's)
-within its parent's sagittal plane and across that; its one axis, two or three turned on both bones, or those of what
-hangs on the trunk and bears another joint; the root's frame turned in its bone, about its third axis (tilt, the trunk's
-as well) or another, or its origin elsewhere in it."""
+"""The centre of a joint with one or two axes (hinge; elbow: what hangs on a limb of the trunk) off where it is on its
+bones, or with three (ball; the spine's) within its parent's sagittal plane and across that; its one axis, two or three
+turned on both bones, or those of what hangs on the trunk and bears another joint; the root's frame turned in its bone,
+about its third axis (tilt, the trunk's as well) or another, or its origin elsewhere in it."""
 BALLS: tuple[Kind, ...] = ("ball_centre", "ball_across")
 """Centres of joints with three axes that are not the spine's."""
 OF_FRAMES: tuple[Kind, ...] = ("root_frame", "frame_tilt", "root_origin")
@@ -200,6 +201,7 @@ def _sources(
     frames about their own: kind, segment of the joint, and how they move the errors' coordinates."""
     planar = not all(spec.markers[0].measured)
     joints = _turning(spec)
+    arms = {segment.name for segment in spec.segments if segment.parent in trunks}
     found: list[tuple[Kind, str, Column]] = []
     for segment in spec.segments:
         if segment.name not in joints:
@@ -223,7 +225,8 @@ def _sources(
             column = _along(name, "moved", R_J, e)
             for child in children:
                 column |= _along(child.name, "moved", R_B @ child.rotation, -e)
-            found.append((_centre(axes, k, name in trunks), name, column))
+            hinge: Kind = "elbow_centre" if segment.parent in arms else "hinge_centre"
+            found.append((hinge if axes < 3 else _centre(k, name in trunks), name, column))
         if not planar:
             if name in trunks:
                 found.append(("frame_tilt", name, _frame_turned(name, R_B, jointed, R_B.T[2])))
@@ -233,9 +236,7 @@ def _sources(
     return found
 
 
-def _centre(axes: int, direction: int, spine: bool) -> Kind:
-    if axes < 3:
-        return "hinge_centre"
+def _centre(direction: int, spine: bool) -> Kind:
     if direction == 2:
         return "ball_across"
     return "spine_centre" if spine else "ball_centre"

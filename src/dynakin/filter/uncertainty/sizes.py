@@ -15,7 +15,7 @@ from dynakin.model.plan import angles_of
 OF_JOINTS = get_args(Kind)
 KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "limbs", "clock", "hands", "hips")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
-CENTRES = ("hinge_centre", "ball_centre", "spine_centre", "ball_across")
+CENTRES = ("hinge_centre", "elbow_centre", "ball_centre", "spine_centre", "ball_across")
 """What goes by how far markers have moved, too."""
 
 
@@ -25,6 +25,7 @@ class Sizes:
 
     Attributes:
         hinge_centre: m, of the centre of a joint with one or two axes (knee, ankle).
+        elbow_centre: m, of the elbow's: its axis does not pass midway between the epicondyles' markers.
         ball_centre, ball_across: m, of the centre of one with three (hip) along the first two axes of its parent
             (forwards and up), and along the third (to the side).
         spine_centre: m, of the trunk's on the pelvis along the first two: one joint stands for all of the spine's.
@@ -59,6 +60,7 @@ class Sizes:
     """
 
     hinge_centre: float
+    elbow_centre: float
     ball_centre: float
     spine_centre: float
     ball_across: float
@@ -95,6 +97,7 @@ class Sizes:
 
 LANDMARKS = Sizes(
     hinge_centre=0.0015,
+    elbow_centre=0.007,
     ball_centre=0.0015,
     spine_centre=0.03,
     ball_across=0.005,
@@ -146,6 +149,7 @@ filter whose skin fades learns from a posture that is held, too, and does not kn
 Chosen for one person on one leg for 20 s; two others judge (docs/validation/deviations.md)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
+    elbow_centre=0.0014,
     ball_centre=0.0016,
     spine_centre=0.0016,
     ball_across=0.0016,

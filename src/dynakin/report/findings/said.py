@@ -121,7 +121,7 @@ _KINDS = (
         "Force plates",
         ("plates", "sum of the plates"),
         "Look with dynakin check which plates are read, where they lie, and what bears on them; declare what else does "
-        "(--contact).",
+        "(--contact), or give it a plate of its own.",
     ),
     _Kind("Model's ranges", ("range",), "Widen them in the file, or give --forward, before OpenSim takes the angles."),
     _Kind(
