@@ -138,6 +138,16 @@ def test_what_pulls_is_no_load() -> None:
     assert rows[plate.name].endswith("loaded 100 %.")
 
 
+def test_a_handle_that_is_pulled_is_loaded() -> None:
+    made = standing(70.0)
+    force = np.zeros((made.n_frames, 3))
+    force[made.n_frames // 2 :] = [60.0, -5.0, 0.0]
+    handle = replace(made.plates[0], name="plate 9", force=force)
+    said = recording_rows(made.with_plates((*made.plates, handle)))
+    rows = dict(str(text).split(": ", 1) for topic, text in said if topic == "Plates")
+    assert rows["plate 9"].startswith("up to 60 N") and rows["plate 9"].endswith("loaded 50 %.")
+
+
 def test_forces_next_to_a_recording_are_named_and_do_what_is_said(tmp_path: Path, capsys: Said) -> None:
     made = simulate("fullbody", "squat", 1, 5.0).recording
     trial = tmp_path / "squat1.trc"

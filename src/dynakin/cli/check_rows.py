@@ -70,8 +70,10 @@ def recording_rows(recording: Recording) -> Rows:
         if not np.isfinite(push).any():
             rows.append(("Plates", f"{plate.name}: not measured."))
             continue
-        loaded = 100.0 * float(np.mean(np.nan_to_num(push) > LOADED_N))
-        text = f"{plate.name}: up to {np.nanmax(push):.0f} N, mean {np.nanmean(push):.1f} N, loaded {loaded:.0f} %."
+        across = np.linalg.norm(plate.force - np.outer(push, main_push(recording.plates)), axis=1)
+        load = np.where(across > np.abs(push), across, push)  # of a handle, too; what pulls along it is none
+        loaded = 100.0 * float(np.mean(np.nan_to_num(load) > LOADED_N))
+        text = f"{plate.name}: up to {np.nanmax(load):.0f} N, mean {np.nanmean(push):.1f} N, loaded {loaded:.0f} %."
         rows.append(("Plates", text))
     return [*rows, *(("Note", short(message)) for message in recording.notes)]
 
