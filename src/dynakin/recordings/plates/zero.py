@@ -27,15 +27,16 @@ class Zero(NamedTuple):
     said: list[Message]
 
 
-def zero_of(name: str, wrench: Array, normal: Array) -> Zero:
-    """Of a plate with this wrench (N, 6) N and N m, whose normal (3,) points towards the person."""
+def zero_of(name: str, wrench: Array, normal: Array, *, emptied: bool = True) -> Zero:
+    """Of a plate with this wrench (N, 6) N and N m, whose normal (3,) points towards the person; emptied: the reader
+    leaves nothing of what pulls."""
     push = wrench[:, :3] @ normal
     known, reads = np.nan_to_num(push, nan=np.inf), read_while_empty(push)
     pulls = part_pulling(push)
     if pulls > LASTING_PULL:
         text = (
             f"{name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in {100.0 * pulls:.0f} % "
-            "of the recording: taken as empty there. Zero it before the trial."
+            f"of the recording{': taken as empty there' if emptied else ''}. Zero it before the trial."
         )
         return Zero(np.zeros(6), min(reads, 0.0), True, [warning("plates", text)])
     own = np.abs(known - reads) < UNLOADED_N
