@@ -87,8 +87,12 @@ def test_a_zero_that_nobody_stands_for_is_refused_before_the_estimate(
     monkeypatch.setattr("dynakin.filter.estimator.Estimator.follow", None)
     arguments = [str(data_dir / "plugin_gait" / "GaitNormal_1.c3d"), "--zero", "standing"]
     assert main(["check", *arguments]) == 1
-    _, checked = printed(capsys)
+    found, checked = printed(capsys)
     assert "nobody stands still for 0.5 s" in checked and "(--static)" in checked
+    assert "Nobody stands still for it (zero = 'standing')." in found
+    for row in ("Model", "Markers", "plug-in-gait", "Subject", "Ground", "Contacts", "Results"):  # what else there is
+        assert row in found
+    assert "mass is missing" not in found
     assert ran(arguments, tmp_path / "out") == 2
     assert printed(capsys)[1] == checked
 
