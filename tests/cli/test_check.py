@@ -87,8 +87,12 @@ def test_a_zero_that_nobody_stands_for_is_refused_before_the_estimate(
     monkeypatch.setattr("dynakin.filter.estimator.Estimator.follow", None)
     arguments = [str(data_dir / "plugin_gait" / "GaitNormal_1.c3d"), "--zero", "standing"]
     assert main(["check", *arguments]) == 1
-    _, checked = printed(capsys)
+    found, checked = printed(capsys)
     assert "nobody stands still for 0.5 s" in checked and "(--static)" in checked
+    assert "Nobody stands still for it (zero = 'standing')." in found
+    for row in ("Model", "Markers", "plug-in-gait", "Subject", "Ground", "Contacts", "Results"):  # what else there is
+        assert row in found
+    assert "mass is missing" not in found
     assert ran(arguments, tmp_path / "out") == 2
     assert printed(capsys)[1] == checked
 
@@ -136,6 +140,16 @@ def test_what_pulls_is_no_load() -> None:
     rows = dict(str(text).split(": ", 1) for topic, text in said if topic == "Plates")
     assert rows["plate 9"] == "up to -40 N, mean -40.0 N, loaded 0 %."
     assert rows[plate.name].endswith("loaded 100 %.")
+
+
+def test_a_handle_that_is_pulled_is_loaded() -> None:
+    made = standing(70.0)
+    force = np.zeros((made.n_frames, 3))
+    force[made.n_frames // 2 :] = [60.0, -5.0, 0.0]
+    handle = replace(made.plates[0], name="plate 9", force=force)
+    said = recording_rows(made.with_plates((*made.plates, handle)))
+    rows = dict(str(text).split(": ", 1) for topic, text in said if topic == "Plates")
+    assert rows["plate 9"].startswith("up to 60 N") and rows["plate 9"].endswith("loaded 50 %.")
 
 
 def test_forces_next_to_a_recording_are_named_and_do_what_is_said(tmp_path: Path, capsys: Said) -> None:

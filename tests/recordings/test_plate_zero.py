@@ -11,6 +11,7 @@ import pytest
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.formats.c3d import read_c3d
 from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.plates.zero import zero_of
 from dynakin.recordings.recording import Plate
 from support.made_c3d import made_c3d
 from support.made_recordings import standing
@@ -176,3 +177,20 @@ def test_what_may_be_a_light_load_is_left_to_the_markers(tmp_path: Path) -> None
     assert np.median(found.force[:, up]) == pytest.approx(8.0, abs=0.1) and "or by a light load" in said[0]
     noise, said = plate_of(tmp_path / "b.c3d", -2.0)
     assert noise.empty_n == 0.0 and not said
+
+
+@pytest.mark.parametrize("part", [0.4, 0.7, 1.0])
+def test_a_handle_that_is_pulled_keeps_its_load(part: float) -> None:
+    """It carries across the plate's normal, where it read -60 N before and nothing during the pull."""
+    handle = np.tile([0.0, -6.0, 0.0, 0.0, 0.0, 0.0], (1000, 1))
+    handle[: round(1000 * part), 0] = 60.0
+    found = zero_of("plate 9", handle, np.array([0.0, 1.0, 0.0]))
+    assert not found.wrench.any() and found.reads_n == -6.0
+    assert "plate 9 reads -6 N where nobody stands on it, but with a load across it (not" in str(found.said[0])
+
+
+def test_a_short_pull_leaves_the_zero_of_the_rest() -> None:
+    handle = np.tile([2.0, -6.0, 1.0, 0.0, 0.0, 0.0], (1000, 1))
+    handle[:100, 0] = 60.0
+    found = zero_of("plate 9", handle, np.array([0.0, 1.0, 0.0]))
+    np.testing.assert_allclose(found.wrench[:3], [2.0, -6.0, 1.0])

@@ -337,3 +337,17 @@ def test_a_gap_in_a_table_that_is_resampled_is_refused_by_file_and_time(tmp_path
     table = read_table(write(tmp_path, "grf.mot", single(lacking(np.arange(1000) / 1000, 500, 501))))
     with pytest.raises(RecordingError, match=r"grf\.mot: no row between 0\.499 s and 0\.502 s, expected one every"):
         attach_forces(read(trc(tmp_path, 100)), table, ReadOptions())
+
+
+@pytest.mark.parametrize("rate", [1000.0, 100.0])
+def test_that_a_plate_pulls_throughout_is_said_at_any_rate(tmp_path: Path, rate: float) -> None:
+    """Nothing was of a table at the markers' rate, which is left as it is."""
+    time = np.arange(round(rate) + 1) / rate
+    push = np.where((time > 0.3) & (time < 0.8), 700.0, -60.0)
+    of_one = QUANTITIES | {"vx": 0.0, "vy": push, "vz": 0.0, "mx": 0.0, "my": 0.0, "mz": 0.0}
+    text = grf_text(time, {f"FP1_{key}": value for key, value in of_one.items()})
+    recording = read(trc(tmp_path, 101), write(tmp_path, "a.mot", text))
+    (said,) = [m for m in recording.notes if "which no plate can" in m.text]
+    assert said.level == "warning" and "plate 1 pulls by up to 60 N" in said.text and "Zero it" in said.text
+    empty = np.abs(recording.plates[0].force[5, 1]) < 1.0
+    assert ("taken as empty there" in said.text) == empty == (rate > 100.0)

@@ -15,12 +15,15 @@ from dynakin.pipeline.result import Result
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.standing import standing_window
 from dynakin.results.estimate import Estimate
+from dynakin.results.failures import Failures
 from dynakin.results.measures.angles import CONVENTIONS, convention_of, with_angles
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.power import work_of
 from dynakin.results.measures.pressure import centre_of_pressure
 from dynakin.results.measures.symmetry import symmetry_index
 from dynakin.simulation.trial import simulate_squat
+from dynakin.validation.case import Setup
+from dynakin.validation.methods import compare_trial, estimate_each
 
 
 def test_signs_and_zero_of_the_table(estimate: Estimate, tmp_path: Path) -> None:
@@ -88,6 +91,20 @@ def test_a_standing_trial_gives_the_zero() -> None:
     shaken = replace(moving, markers=moving.markers + np.sin(40.0 * moving.time)[:, None, None] * 0.02)
     with pytest.raises(RecordingError, match="nobody stands still"):
         standing_zero(estimator, estimate, shaken)
+
+
+def test_a_zero_that_nobody_stands_for_is_refused_before_any_estimate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a batch it was once each trial was estimated, as a part that failed; in a comparison, too."""
+    monkeypatch.setattr("dynakin.filter.estimator.Estimator.follow", None)
+    moving = simulate_squat(seed=3, duration_s=6.0).recording.window(2.0, 6.0)
+    shaken = replace(moving, markers=moving.markers + np.sin(40.0 * moving.time)[:, None, None] * 0.006)
+    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+    estimator = dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject, markers="opencap"))
+    setup = Setup(estimator, zero="standing")
+    with pytest.raises(RecordingError, match=r"nobody stands still.*\(--static\)"):
+        estimate_each(shaken, setup, failures=Failures())
+    with pytest.raises(RecordingError, match="nobody stands still"):
+        compare_trial(shaken, setup)
 
 
 def test_symmetry_index() -> None:

@@ -32,20 +32,27 @@ _SOME_KG = 70.0
 
 
 def rehearsed(case: Case) -> tuple[Prepared | None, DynakinError | None]:
-    """The trial as a run prepares it, or what it would refuse it with; both where only the mass is missing."""
+    """The trial as a run prepares it, or what it would refuse it with; both where only the mass, or somebody who stands
+    for the zero, is missing."""
     try:
         return next(iter(prepare_case(case).values())), None
     except DynakinError as error:
         refusal = error
-    if case.config.mass_kg is None and refusal.asks_for == "mass_kg":
+    setup = replace(case.setup, zero="model")
+    if lacks_mass(refusal) and case.config.mass_kg is None:
         somebody = case.config.changed(mass_kg=_SOME_KG).subject()
-        common = replace(case.setup.common, model=case.setup.definition.with_subject(somebody))
-        setup = replace(case.setup, common=common)
-        try:
-            return next(iter(prepare_case(replace(case, setup=setup)).values())), refusal
-        except DynakinError:
-            pass
-    return None, refusal
+        setup = replace(setup, common=replace(setup.common, model=setup.definition.with_subject(somebody)))
+    elif case.setup.zero == setup.zero:
+        return None, refusal
+    try:
+        return next(iter(prepare_case(replace(case, setup=setup)).values())), refusal
+    except DynakinError:
+        return None, refusal
+
+
+def lacks_mass(refusal: DynakinError | None) -> bool:
+    """Whether a run is refused for the mass."""
+    return refusal is not None and refusal.asks_for == "mass_kg"
 
 
 def recording_rows(recording: Recording) -> Rows:
@@ -70,8 +77,10 @@ def recording_rows(recording: Recording) -> Rows:
         if not np.isfinite(push).any():
             rows.append(("Plates", f"{plate.name}: not measured."))
             continue
-        loaded = 100.0 * float(np.mean(np.nan_to_num(push) > LOADED_N))
-        text = f"{plate.name}: up to {np.nanmax(push):.0f} N, mean {np.nanmean(push):.1f} N, loaded {loaded:.0f} %."
+        across = np.linalg.norm(plate.force - np.outer(push, main_push(recording.plates)), axis=1)
+        load = np.where(across > np.abs(push), across, push)  # of a handle, too; what pulls along it is none
+        loaded = 100.0 * float(np.mean(np.nan_to_num(load) > LOADED_N))
+        text = f"{plate.name}: up to {np.nanmax(load):.0f} N, mean {np.nanmean(push):.1f} N, loaded {loaded:.0f} %."
         rows.append(("Plates", text))
     return [*rows, *(("Note", short(message)) for message in recording.notes)]
 
@@ -102,7 +111,8 @@ def model_rows(
     calibrated = ready.calibrated
     said = calibrated.messages
     subject = about(said, "mass", "height", "sex")
-    doubted = [] if refusal is not None else warnings_of(about(said, "calibration", "labels"))
+    massless = lacks_mass(refusal)
+    doubted = [] if massless else warnings_of(about(said, "calibration", "labels"))
     elsewhere = {*about(said, "marker set", "ground", "details"), *subject, *doubted}  # a run's report has the details
     more: dict[str, list[str | Message]] = {
         "Model": [*_held(ready)],
@@ -111,16 +121,18 @@ def model_rows(
             *(short(message) for message in said if message not in elsewhere),
         ],
         "Ground": [*about(said, "ground")],
-        "Subject": [*warnings_of(subject if refusal is None else about(subject, "height"))],
+        "Subject": [*warnings_of(about(subject, "height") if massless else subject)],
     }
     rows: Rows = []
     for topic, text in assumed(ready, settings):
-        if topic == "Subject" and refusal is not None:
+        if topic == "Subject" and massless:
             text = f"The mass is missing. {in_a_row(about(subject, 'height', 'sex'))}"
         rows += [(topic, row) for row in (text, *more.get(topic, []))]
     rows += contacts(ready)
-    if refusal is not None:
+    if massless:
         return rows
+    if refusal is not None:
+        rows.append(("Zero", "Nobody stands still for it (zero = 'standing')."))
     figures = ready.moment_figures()
     doubts = [m for m in warnings_of(ready.messages) if m not in (*said, *above) or m in doubted]
     there = [sentence(message.text) for message in doubts]  # with what to do
@@ -171,18 +183,19 @@ def to_add(case: Case, ready: Prepared | None, refusal: DynakinError | None) -> 
         found.append("--forces FILE.mot: nothing measures the ground's reaction.")
     if settings.static is None and path is not None and (static := companion_static(path, recording)) is not None:
         found.append(f"--static {static.name} (found next to the recording): lengths and marker places of standing.")
-    if refusal is not None and ready is not None and settings.mass_kg is None:
+    massless = lacks_mass(refusal)
+    if massless and ready is not None:
         found.append("--mass KG: neither plates nor file show it.")
     if ready is None:
         return found
     said = ready.calibrated.messages
-    if refusal is None and warnings_of(about(said, "mass")):
+    if not massless and warnings_of(about(said, "mass")):
         found.append("--mass KG: it is only estimated (Subject, above).")
     if settings.height_m is None and ready.calibrated.height_m is not None and "height_m" not in _in_files(case):
         found.append("--height M: it is only estimated (Subject, above).")
     if about(said, "sex"):
         found.append("--sex female or male: else the table's mean of both.")
-    if refusal is None and ready.ground.undeclared.any() and not settings.contacts:
+    if not massless and ready.ground.undeclared.any() and not settings.contacts:
         found.append("--contact seat (hand_right, ...): if that is what bears the person where no plate does.")
     return found
 

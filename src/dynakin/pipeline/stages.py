@@ -13,7 +13,6 @@ from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
-from dynakin.filter.zero import zero_window
 from dynakin.messages import note
 from dynakin.progress import Progress, stage
 from dynakin.recordings.read import extensions
@@ -25,7 +24,7 @@ from dynakin.settings.noise import Noise
 from dynakin.settings.settings import Settings, read_keys
 from dynakin.settings.subject import Subject
 from dynakin.validation.case import Case, case_of
-from dynakin.validation.methods import ComparedTrial, estimate_each, trial_of, with_lost
+from dynakin.validation.methods import ComparedTrial, estimate_each, prepare_each, trial_of, with_lost
 
 if TYPE_CHECKING:  # loaded while the core works
     from dynakin.identification.observability.structure import Structure
@@ -134,13 +133,7 @@ def prepare_case(case: Case) -> dict[str, Prepared]:
     Raises:
         DynakinError: as `run`, for all that can be known before the estimate.
     """
-    setup = case.setup
-    if setup.zero == "standing":
-        zero_window(case.static or case.recording)
-    return {
-        title: setup.estimator(title).prepare(case.recording, static=case.static, lag_s=setup.lag_s)
-        for title in setup.noise
-    }
+    return prepare_each(case.recording, case.setup, static=case.static)
 
 
 @one_blas_thread

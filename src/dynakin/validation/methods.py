@@ -15,7 +15,7 @@ from dynakin.blas import one_blas_thread
 from dynakin.errors import DynakinError, LostError, ModelError
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
-from dynakin.filter.zero import asked_angles
+from dynakin.filter.zero import asked_angles, zero_window
 from dynakin.messages import Message, about, note, notes_of, warning, warnings_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
@@ -167,6 +167,20 @@ def with_lost(trial: ComparedTrial, lost: Mapping[str, str]) -> ComparedTrial:
     return replace(trial, notes=(*trial.notes, *notes), lost=dict(lost))
 
 
+def prepare_each(recording: Recording, setup: Setup, *, static: Recording | None = None) -> dict[str, Prepared]:
+    """The trial as prepared for every preset, before any takes its time.
+
+    Raises:
+        DynakinError: as `Estimator.prepare`; RecordingError: the standing zero that is asked for is nowhere.
+    """
+    ready = {
+        preset: setup.estimator(preset).prepare(recording, static=static, lag_s=setup.lag_s) for preset in setup.noise
+    }
+    if setup.zero == "standing":
+        zero_window(static or recording)
+    return ready
+
+
 def estimate_each(
     recording: Recording,
     setup: Setup,
@@ -182,21 +196,21 @@ def estimate_each(
     Args:
         keep_lost: those that lost the person are estimates like the others. failures: takes what fails once an
             estimate is there (the angles that were asked for); not given: it is raised.
-        ready: the trial as prepared for these presets (`Estimator.prepare`), where that has been done.
+        ready: what `prepare_each` gave, where that has been done.
 
     Returns:
         By preset: the estimates, why others lost the person, and the trackers of all as they ended.
 
     Raises:
-        LostError: no filter followed the person. DynakinError: as `Estimator.run`.
+        LostError: no filter followed the person. DynakinError: as `prepare_each` and `Estimator.run`.
     """
+    ready = prepare_each(recording, setup, static=static) if ready is None else ready
     estimates: dict[str, Estimate] = {}
     lost: dict[str, str] = {}
     trackers: dict[str, Tracker] = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
-        made = (ready or {}).get(preset) or estimator.prepare(recording, static=static, lag_s=setup.lag_s)
-        estimate, trackers[preset] = estimator.follow(made, progress)
+        estimate, trackers[preset] = estimator.follow(ready[preset], progress)
         reason = None if keep_lost else why_lost(estimate)
         if reason is not None:
             lost[preset] = reason

@@ -155,10 +155,11 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         text = f"{table.path.name} replaces the {len(recording.plates)} plates of {recording.name}."
         notes += (note("recording", text),)
     untouched = same_times(table.time, recording.time)
+    as_it_is = untouched and options.plate_filter_hz is None and options.force_threshold_n is None
     hung = [_frozen(plate, table.time) for plate in plates]
     up = main_push(plates)
     zeros = [
-        zero_of(plate.name, np.where(lost[:, None], np.nan, plate.wrench), up)
+        zero_of(plate.name, np.where(lost[:, None], np.nan, plate.wrench), up, emptied=not as_it_is)
         for plate, lost in zip(plates, hung, strict=True)
     ]
     plates = tuple(
@@ -178,8 +179,7 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
             f"{recording.n_frames} marker frames ({'causal' if options.causal else 'zero-phase'} filter)."
         )
         notes += (note("routine", text),)
-    as_it_is = untouched and options.plate_filter_hz is None and options.force_threshold_n is None
-    notes += tuple(said for zero in zeros if not (zero.pulls and as_it_is) for said in zero.said)
+    notes += tuple(said for zero in zeros for said in zero.said)
     if as_it_is:
         return recording.with_plates(tuple(map(without_frames, plates, hung)), notes)
     time = recording.time[covered]

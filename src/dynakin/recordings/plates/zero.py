@@ -27,25 +27,35 @@ class Zero(NamedTuple):
     said: list[Message]
 
 
-def zero_of(name: str, wrench: Array, normal: Array) -> Zero:
-    """Of a plate with this wrench (N, 6) N and N m, whose normal (3,) points towards the person."""
+def zero_of(name: str, wrench: Array, normal: Array, *, emptied: bool = True) -> Zero:
+    """Of a plate with this wrench (N, 6) N and N m, whose normal (3,) points towards the person; emptied: the reader
+    leaves nothing of what pulls."""
     push = wrench[:, :3] @ normal
     known, reads = np.nan_to_num(push, nan=np.inf), read_while_empty(push)
     pulls = part_pulling(push)
     if pulls > LASTING_PULL:
         text = (
             f"{name} pulls by up to {-np.nanmin(push):.0f} N, which no plate can, in {100.0 * pulls:.0f} % "
-            "of the recording: taken as empty there. Zero it before the trial."
+            f"of the recording{': taken as empty there' if emptied else ''}. Zero it before the trial."
         )
         return Zero(np.zeros(6), min(reads, 0.0), True, [warning("plates", text)])
     own = np.abs(known - reads) < UNLOADED_N
-    if reads < 0.0 and np.count_nonzero(own) >= _STEADY * np.count_nonzero(known < JUDGED_N):
+    steadily = np.count_nonzero(own) >= _STEADY * np.count_nonzero(known < JUDGED_N)
+    if reads < 0.0 and steadily and _of_nobody(wrench[own, :3] - np.outer(push[own], normal)):
         text = f"{name} reads {reads:.3g} N where nobody stands on it: it is taken off over the whole trial."
         said = (warning if -reads > UNLOADED_N else note)("zero", text)
         return Zero(np.nanmedian(wrench[own], axis=0), 0.0, False, [said])
     if abs(reads) < _OFFSET_WORTH_A_NOTE_N:
         return Zero(np.zeros(6), reads, False, [])
-    left = ", but not steadily (not taken off as it is read)" if reads < 0.0 else ", or by a light load"
+    why = "with a load across it" if steadily else "not steadily"
+    left = f", but {why} (not taken off as it is read)" if reads < 0.0 else ", or by a light load"
     return Zero(
         np.zeros(6), reads, False, [note("plates", f"{name} reads {reads:.3g} N where nobody stands on it{left}.")]
     )
+
+
+def _of_nobody(across: Array) -> bool:
+    """Whether forces (M, 3) N across the normal are a zero as well, and no handle that is pulled: steady and small."""
+    middle = np.nanmedian(across, axis=0)
+    steady = np.mean(np.linalg.norm(across - middle, axis=1) < UNLOADED_N)
+    return bool(np.linalg.norm(middle) < JUDGED_N and steady >= _STEADY)
