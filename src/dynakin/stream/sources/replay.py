@@ -70,7 +70,7 @@ class Replay:
             tuple(map(str, recording.notes)),
             recording.subject,
             paced=self.speed > 0.0,
-            length_s=min(float(recording.time[-1] - recording.time[0]), self.duration_s or np.inf),
+            length_s=float(recording.time[-1] - recording.time[0]),
         )
 
     def read(self, timeout_s: float) -> Sequence[Packet | Seam] | None:
