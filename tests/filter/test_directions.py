@@ -13,8 +13,10 @@ from dynakin.filter.directions import clinical_signs
 from dynakin.model.definition import load_model
 from dynakin.report.page import Page
 from dynakin.report.sections.joints import angle_section, moment_section
+from dynakin.report.sections.repetitions import side_plots
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import angle_columns, convention_of, with_angles
+from dynakin.results.measures.mean_curves import estimate_curves
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.simulation.trial import simulate
 
@@ -82,3 +84,6 @@ def test_titles_and_clinical_angles_follow_the_model(walk: Estimate) -> None:
     names, values, lines = angle_columns(asked)
     k = names.index("knee_flexion_r")
     assert values[:, k].max() > 50.0 and lines[k].startswith("knee_flexion_r: + flexion, - extension")
+    plots, _ = side_plots(asked, estimate_curves(asked))
+    assert {plot.title for plot in plots["moments"]} >= {"Knee (+ extension)", "Ankle (+ dorsiflexion)"}
+    assert "Knee angle (+ flexion)" in {plot.title for plot in plots["angles"]}
