@@ -15,7 +15,9 @@ from dynakin.report.paper_figures.figures import FIGURES, draw_figure, save_figu
 from dynakin.report.paper_figures.movement import middle_cycle
 from dynakin.report.paper_figures.parameters import spread
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.sources import DERIVED
 from dynakin.validation.methods import ComparedTrial
+from support.estimates.spatial import make_spatial
 
 
 def words_in(path: Path) -> str:
@@ -75,7 +77,23 @@ def test_formats_and_what_is_left_out(jointed: Estimate, tmp_path: Path) -> None
 def test_moments_of_all_joints_stand_in_one_figure(saved: Path) -> None:
     moments = words_in(saved / "moments.svg")
     assert moments.count("moment, N m") == 1 and "± 2 standard deviations" in moments
-    assert all(f"| {joint} |" in f"| {moments} |" for joint in ("Ankle", "Knee", "Hip", "Shoulder"))
+    titles = ("Ankle (+ dorsiflexion)", "Knee (+ flexion)", "Hip (+ flexion)", "Shoulder (+ flexion)")
+    assert all(f"| {title} |" in f"| {moments} |" for title in titles)
+    assert moments.count("sum of both legs") == 3 and "the ground’s moment" in moments
+
+
+def test_bands_of_derived_moments_do_not_press_the_lines_flat() -> None:
+    """A leg without a plate: in the first and last frames its moments say nothing."""
+    spatial = make_spatial()
+    data = spatial.data
+    sd, source = data["moments_sd"].copy(), data["moment_source"].copy()
+    knee = {"coordinate": data["coordinate"].values.tolist().index("knee_angle_l")}
+    source[knee] = DERIVED
+    sd[{"time": slice(0, 5), **knee}] = 100.0
+    figure = draw_figure("moments", replace(spatial, data=data.assign(moments_sd=sd, moment_source=source)))
+    axes = next(a for a in figure.axes if a.get_title(loc="left").startswith("Knee"))
+    low, high = axes.get_ylim()
+    assert -125.0 < low < -90.0 and 0.0 < high < 35.0  # the lines go from -90 to 0 N m
 
 
 def test_one_figure_is_drawn_by_its_name_and_shown_by_a_notebook(jointed: Estimate) -> None:

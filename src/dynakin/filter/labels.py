@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.directions import clinical_signs
 from dynakin.filter.sources import moved_segments
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
@@ -33,6 +34,7 @@ def labels(
             [_file_unit(initial, c.name, kinds[c.name]) for c in spec.coordinates],
         ),
         "coordinate_segment": ("coordinate", moved_segments(spec)),
+        "clinical_sign": ("coordinate", np.array(clinical_signs(model), dtype=np.int8)),
         "marker": list(initial.recorded_markers),
         "axis": list(AXES),
         "axis_": list(AXES),

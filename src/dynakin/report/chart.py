@@ -82,7 +82,7 @@ def chart(
     Args:
         least_range: in ``unit``; less than this is not blown up to fill the panel.
     """
-    low, high = _range(lines, [bound.value for bound in bounds], least_range)
+    low, high = value_range(lines, least_range, [bound.value for bound in bounds])
     start, end = float(time[0]), float(time[-1])
     if end <= start:
         end = start + 1.0
@@ -133,7 +133,12 @@ def _filling(line: Line) -> Array:
     return np.concatenate([line.values[known & (line.source == MEASURED)], rare])
 
 
-def _range(lines: Sequence[Line], levels: Sequence[float], least: float) -> tuple[float, float]:
+def value_range(lines: Sequence[Line], least: float = 0.0, levels: Sequence[float] = ()) -> tuple[float, float]:
+    """Ends of the axis of values: what is drawn decides, and of the bands what lies near it.
+
+    Args:
+        least: less than this is not blown up to fill the panel. levels: that have to be in it.
+    """
     values = np.concatenate([*(_filling(line) for line in lines), np.asarray(levels, dtype=float)])
     if not len(values):
         return -1.0, 1.0

@@ -79,8 +79,9 @@ class Estimate:
     or not modelled is NaN. ``*_innovation`` is what was measured less what was predicted, and ``test_ratio`` its
     square, normalised by its covariance, over the gate's limit (0 without a gate); ``verdict`` is 0 where a sensor is
     missing, 1 accepted, 2 refused, by the gate or because recovery found that it fits nothing. The coordinate variable
-    ``coordinate_type`` says "rotation" or "translation" for each coordinate, ``marker_axes_modelled`` says for each
-    axis whether the model explains it. The wrench is what the ground does to the person, about the model's ground
+    ``coordinate_type`` says "rotation" or "translation" for each coordinate, ``clinical_sign`` 1 or -1 where it grows
+    with or against the clinical angle of its name and 0 where neither, ``marker_axes_modelled`` for each axis whether
+    the model explains it. The wrench is what the ground does to the person, about the model's ground
     origin. ``wrench_estimated`` is the sum of ``foot_wrench`` where plates measure all contacts, else what the movement
     needs by the model, which ``wrench_needed`` is throughout, with all that the model does not explain in it.
     ``joint_loads`` is what a segment's parent does to it through the joint by which it hangs, muscles and all, ground

@@ -3,6 +3,7 @@ curves."""
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +15,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Patch
 
 from dynakin.report.body import chain_of, painted
-from dynakin.report.chart import band_is_too_wide
+from dynakin.report.chart import Line, band_is_too_wide, value_range
 from dynakin.report.figure import Figure, draw_sourced
 from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.sections.repetitions import (
@@ -29,9 +30,10 @@ from dynakin.report.sections.repetitions import (
     plots_by_method,
     side_plots,
 )
-from dynakin.report.sides import Joint, joints_of, side_lines
+from dynakin.report.sides import Joint, joints_of, normalising_mass, side_lines
 from dynakin.report.styles import BAND, ESTIMATED, INK, MEASURED, QUIET, LineStyle, method_styles, source_key
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.angles import ways_of
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.mean_curves import PERCENT, estimate_curves
 from dynakin.results.measures.metrics import evaluation_window
@@ -142,13 +144,17 @@ def moments_figure(estimate: Estimate, comparison: ComparedTrial | None = None) 
     ]
     if not joints:
         return None
-    figure, every = _grid(len(joints), 1.55)
+    figure, every = _grid(len(joints), 1.6)
+    ways, names = ways_of(estimate), estimate.coordinate_names
     for axes, joint in zip(every, joints, strict=False):
+        lines = [Line(moments[:, k], "", sd=sd[:, k], source=source[:, k]) for k in joint.columns.values()]
         for side, k in joint.columns.items():
             moment, half, colour = moments[:, k], 2.0 * sd[:, k], styles[side].colour
             draw_sourced(axes, estimate.time, moment, source[:, k], color=colour, linewidth=1.2)
             axes.fill_between(estimate.time, moment - half, moment + half, color=colour, alpha=0.18, linewidth=0)
-        axes.set_title(joint.name if joint.rotation else f"{joint.name}, N")
+        title = joint.name + ways[k] if joint.rotation else f"{joint.name}, N"
+        _title(axes, (title, moment_note(estimate, names[k])), 24)
+        axes.set_ylim(value_range(lines, 0.02 * (normalising_mass(estimate) or 1.0)))
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
     figure.supxlabel("time, s", fontsize=8, color=QUIET)
     figure.supylabel("moment, N m", fontsize=8, color=QUIET)
@@ -166,6 +172,13 @@ def _grid(panels: int, height: float) -> tuple[Figure, np.ndarray]:
     for axes in every[panels:]:
         axes.set_visible(False)
     return figure, every
+
+
+def _title(axes: Axes, texts: Sequence[str], letters: int) -> None:
+    """Lines of so many letters, as the panel holds; what is in brackets stays together."""
+    whole = [re.sub(r"\(.*\)", lambda found: found[0].replace(" ", "\xa0"), text) for text in texts if text]
+    lines = "\n".join(textwrap.fill(text, letters) for text in whole)
+    axes.set_title(lines.replace("\xa0", " "), fontsize=7.5)
 
 
 def _side_styles(estimate: Estimate, joints: Sequence[Joint]) -> list[LineStyle]:
@@ -319,8 +332,7 @@ def repetitions_figure(
         axes.set_visible(False)
     for plot, axes in zip(plots, panels, strict=False):
         _mean_curves(axes, plot)
-        titles = (plot.title, note_of(estimate, plot.curves[0][1]))
-        axes.set_title("\n".join(textwrap.fill(text, 28) for text in titles if text), fontsize=7.5)
+        _title(axes, (plot.title, note_of(estimate, plot.curves[0][1])), 28)
     shown = [curve for plot in plots for _, curve in plot.curves]
     most = [int(curve.n.max()) for curve in shown]
     n, least = max(most), min(most)

@@ -11,7 +11,7 @@ from dynakin.report.labels import moment_note, since
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import REGIONS, Joint, joints_of, normalising_mass, side_key, side_lines
 from dynakin.report.styles import BAND, source_key
-from dynakin.results.measures.angles import reported, way_of
+from dynakin.results.measures.angles import reported, ways_of
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, UNKNOWN, moment_sources
 from dynakin.results.naming import listed, number, sentence
 
@@ -21,6 +21,7 @@ def angle_section(page: Page) -> Section:
     estimate, lines_of = page.estimate, side_lines(page.estimate)
     sign, offset, _, asked = shown = reported(estimate)
     values, sd = shown.of(estimate.known("coordinates")), estimate.values("coordinates_sd")
+    ways = ways_of(estimate, sign)
     about = "Each in the direction in which the model counts, from the model’s zero."
     if asked:
         clinical = estimate.data.attrs["angle_signs"] == "clinical"
@@ -41,9 +42,10 @@ def angle_section(page: Page) -> Section:
             lines.append(Line(own, lines_of[side].colour, 1.2, band))
             moved = f"{number(low)} to {number(high)}" if high > low else f"locked at {number(low, unit)}"
             ranges.append(f"{f'{side} ' if side else ''}{moved}{wide}")
-        title = joint.title + (way_of(estimate.coordinate_names[one], sign[one]) if joint.rotation else "")
         least = 2.0 if joint.rotation else 10.0
-        return chart(title, unit, estimate.time, lines[::-1], note="; ".join(ranges), least_range=least)
+        return chart(
+            joint.title + ways[one], unit, estimate.time, lines[::-1], note="; ".join(ranges), least_range=least
+        )
 
     panels, parts = _by_region("angles", joints_of(estimate), draw)
     return Section(
@@ -66,7 +68,7 @@ def moment_section(page: Page) -> Section:
     moments = estimate.values("moments") / (mass or 1.0)
     sd = estimate.values("moments_sd") / (mass or 1.0) if "moments_sd" in estimate.data else None
     source, peaks = moment_sources(estimate.data), page.metrics["peak_moments_per_kg"] if mass else None
-    found = page.metrics["moments"] or UNKNOWN
+    found, ways = page.metrics["moments"] or UNKNOWN, ways_of(estimate)
 
     def draw(joint: Joint) -> Panel | None:
         unit = ("N m" if joint.rotation else "N") + ("/kg" if mass else "")
@@ -86,8 +88,7 @@ def moment_section(page: Page) -> Section:
                 notes.append(about)
         if not lines:
             return None
-        title = joint.name + (way_of(name) if joint.rotation else "")
-        return chart(title, unit, estimate.time, lines[::-1], note="; ".join(notes), least_range=0.02)
+        return chart(joint.name + ways[k], unit, estimate.time, lines[::-1], note="; ".join(notes), least_range=0.02)
 
     joints = [joint for joint in joints_of(estimate) if joint.region != "Whole body"]
     panels, parts = _by_region("moments", joints, draw)

@@ -13,7 +13,7 @@ from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import Joint, joints_of, side_key, side_lines
 from dynakin.report.styles import ESTIMATED_LINE, MEASURED_LINE, LineStyle, method_styles
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.angles import reported, way_of
+from dynakin.results.measures.angles import reported, ways_of
 from dynakin.results.measures.mean_curves import MEASURED, PERCENT, MeanCurve
 from dynakin.results.measures.repetitions import Found
 from dynakin.results.naming import listed, sentence, words
@@ -57,10 +57,9 @@ def side_plots(estimate: Estimate, curves: Sequence[MeanCurve]) -> tuple[dict[st
     """The same by kind, and the joints of whose moments no cycle is left."""
     own = {(curve.side, curve.quantity): curve for curve in curves if curve.method.startswith("EKF")}
     joints = [joint for joint in joints_of(estimate) if joint.region in ("Legs", "Trunk and head")]
-    styles, ways = side_lines(estimate), reported(estimate).way
-    names = estimate.coordinate_names
-    angles = [_sides(joint, own, "", styles, ways, names) for joint in joints]
-    moments = {joint.name.lower(): _sides(joint, own, "/moment", styles, ways, names) for joint in joints}
+    styles, ways, grows = side_lines(estimate), reported(estimate).way, ways_of(estimate)
+    angles = [_sides(joint, own, "", styles, ways) for joint in joints]
+    moments = {joint.name.lower(): _sides(joint, own, "/moment", styles, grows) for joint in joints}
     wrench = [curve for curve in curves if curve.quantity in COMPONENTS and curve.method.startswith(("EKF", MEASURED))]
     plots = {
         "angles": [plot for plot in angles if plot],
@@ -124,6 +123,7 @@ def plots_by_method(estimate: Estimate, curves: Sequence[MeanCurve]) -> list[Plo
     found: dict[tuple[str, str], list[MeanCurve]] = {}
     for curve in curves:
         found.setdefault((curve.side, curve.quantity), []).append(curve)
+    grows = dict(zip(estimate.coordinate_names, ways_of(estimate), strict=True))
     plots = []
     for group in found.values():
         if not any(curve.method != MEASURED and _moves(curve.mean[curve.n > 0]) for curve in group):
@@ -132,7 +132,7 @@ def plots_by_method(estimate: Estimate, curves: Sequence[MeanCurve]) -> list[Plo
         notes = [first.times + ("" if first.n.max() > 1 else ", no standard deviation")]
         if about := note_of(estimate, first):
             notes.insert(0, about)
-        plots.append(Plot(_title(first), ", ".join(notes), [(styles[c.method], c) for c in _in_order(group)]))
+        plots.append(Plot(_title(first, grows), ", ".join(notes), [(styles[c.method], c) for c in _in_order(group)]))
     return plots
 
 
@@ -154,11 +154,11 @@ def note_of(estimate: Estimate, curve: MeanCurve) -> str:
     return moment_note(estimate, curve.quantity.removesuffix("/moment")) if kind_of(curve) == "moments" else ""
 
 
-def _title(curve: MeanCurve) -> str:
+def _title(curve: MeanCurve, grows: Mapping[str, str]) -> str:
     """`Knee`, with the foot where each has its own cycles."""
     name = curve.quantity.removesuffix("/moment")
     text = COMPONENT_LABELS[name][0] if name in COMPONENT_LABELS else sentence(words(name))
-    text += way_of(name) if kind_of(curve) == "moments" else ""
+    text += grows.get(name, "") if kind_of(curve) == "moments" else ""
     return text if curve.side == "both" else f"{text}, {curve.side} cycle"
 
 
@@ -177,7 +177,6 @@ def _sides(
     suffix: str,
     styles: Mapping[str, LineStyle],
     ways: Sequence[str],
-    names: Sequence[str],
 ) -> Plot | None:
     drawn = []
     for side in joint.columns:
@@ -190,8 +189,8 @@ def _sides(
         return None
     note = "; ".join(f"{f'{side}: ' if side else ''}{curve.times}" for side, curve in drawn)
     one = next(iter(joint.columns.values()))
-    title = joint.name + way_of(names[one]) if suffix else joint.title + ways[one]
-    return Plot(title, note, [(styles[side], curve) for side, curve in drawn if curve.n.any()][::-1])
+    title = joint.name if suffix else joint.title
+    return Plot(title + ways[one], note, [(styles[side], curve) for side, curve in drawn if curve.n.any()][::-1])
 
 
 def _panel(plot: Plot) -> Panel:

@@ -16,37 +16,45 @@ Signs = Literal["opensim", "clinical"]
 
 
 class Convention(NamedTuple):
-    """Clinical name of a coordinate, its sign against OpenSim's, and what its two directions are called."""
+    """Clinical name of a coordinate, its sign against OpenSim's, what its two directions are called, and about which
+    axis of a standing person its positive one turns the lower segment of a joint, or the trunk (X forward, Y up, Z to
+    the right; X and Y of the left side are the right's in a mirror)."""
 
     name: str
     sign: int
     positive: str
     negative: str
+    axis: str
+
+    @property
+    def leg(self) -> bool:
+        """Whether it is of a leg's joint."""
+        return self.name.startswith(("hip", "knee", "ankle", "subtalar"))
 
 
-# The directions are those of OpenSim's models since version 4 (Rajagopal et al. 2016) and of the built-in ones; the
+# The signs are those of OpenSim's models since version 4 (Rajagopal et al. 2016) and of the built-in ones; the
 # clinical names are the International Society of Biomechanics' (Wu et al. 2002, 2005), whose pelvis tilts forwards and
 # whose trunk flexes forwards as positive.
 CONVENTIONS = {
-    "pelvis_tilt": Convention("pelvic_tilt", -1, "anterior", "posterior"),
-    "pelvis_list": Convention("pelvic_obliquity", -1, "right side up", "right side down"),
-    "pelvis_rotation": Convention("pelvic_rotation", 1, "right side forward", "right side backward"),
-    "hip_flexion": Convention("hip_flexion", 1, "flexion", "extension"),
-    "hip_adduction": Convention("hip_adduction", 1, "adduction", "abduction"),
-    "hip_rotation": Convention("hip_rotation", 1, "internal rotation", "external rotation"),
-    "hip": Convention("hip_flexion", 1, "flexion", "extension"),
-    "knee_angle": Convention("knee_flexion", 1, "flexion", "extension"),
-    "knee": Convention("knee_flexion", 1, "flexion", "extension"),
-    "ankle_angle": Convention("ankle_dorsiflexion", 1, "dorsiflexion", "plantarflexion"),
-    "ankle": Convention("ankle_dorsiflexion", 1, "dorsiflexion", "plantarflexion"),
-    "subtalar_angle": Convention("subtalar_inversion", 1, "inversion", "eversion"),
-    "lumbar_extension": Convention("trunk_flexion", -1, "flexion", "extension"),
-    "lumbar": Convention("trunk_flexion", -1, "flexion", "extension"),
-    "arm_flex": Convention("shoulder_flexion", 1, "flexion", "extension"),
-    "shoulder": Convention("shoulder_flexion", 1, "flexion", "extension"),
-    "arm_add": Convention("shoulder_adduction", 1, "adduction", "abduction"),
-    "elbow_flex": Convention("elbow_flexion", 1, "flexion", "extension"),
-    "elbow": Convention("elbow_flexion", 1, "flexion", "extension"),
+    "pelvis_tilt": Convention("pelvic_tilt", -1, "anterior", "posterior", "-z"),
+    "pelvis_list": Convention("pelvic_obliquity", -1, "right side up", "right side down", "-x"),
+    "pelvis_rotation": Convention("pelvic_rotation", 1, "right side forward", "right side backward", "+y"),
+    "hip_flexion": Convention("hip_flexion", 1, "flexion", "extension", "+z"),
+    "hip_adduction": Convention("hip_adduction", 1, "adduction", "abduction", "+x"),
+    "hip_rotation": Convention("hip_rotation", 1, "internal rotation", "external rotation", "+y"),
+    "hip": Convention("hip_flexion", 1, "flexion", "extension", "+z"),
+    "knee_angle": Convention("knee_flexion", 1, "flexion", "extension", "-z"),
+    "knee": Convention("knee_flexion", 1, "flexion", "extension", "-z"),
+    "ankle_angle": Convention("ankle_dorsiflexion", 1, "dorsiflexion", "plantarflexion", "+z"),
+    "ankle": Convention("ankle_dorsiflexion", 1, "dorsiflexion", "plantarflexion", "+z"),
+    "subtalar_angle": Convention("subtalar_inversion", 1, "inversion", "eversion", "+x"),
+    "lumbar_extension": Convention("trunk_flexion", -1, "flexion", "extension", "-z"),
+    "lumbar": Convention("trunk_flexion", -1, "flexion", "extension", "-z"),
+    "arm_flex": Convention("shoulder_flexion", 1, "flexion", "extension", "+z"),
+    "shoulder": Convention("shoulder_flexion", 1, "flexion", "extension", "+z"),
+    "arm_add": Convention("shoulder_adduction", 1, "adduction", "abduction", "+x"),
+    "elbow_flex": Convention("elbow_flexion", 1, "flexion", "extension", "+z"),
+    "elbow": Convention("elbow_flexion", 1, "flexion", "extension", "+z"),
 }
 
 
@@ -57,15 +65,28 @@ def convention_of(coordinate: str) -> tuple[Convention, str] | None:
     return None if found is None else (found, side)
 
 
-def way_of(coordinate: str, sign: float = 1.0) -> str:
-    """ " (+ flexion)": which way a coordinate grows, or the moment that turns it so; "" where it has no clinical name.
+def clinical_signs(estimate: Estimate) -> Array:
+    """Of each coordinate (C,): 1 where it grows as the clinical angle of its name does, -1 against it, 0 where it has
+    no clinical name or the model turns otherwise. The model says so (``clinical_sign``); else OpenSim 4's hold."""
+    if "clinical_sign" in estimate.data.coords:
+        return np.asarray(estimate.data["clinical_sign"].values, dtype=float)
+    found = [convention_of(name) for name in estimate.coordinate_names]
+    return np.array([float(one[0].sign) if one else 0.0 for one in found])
+
+
+def ways_of(estimate: Estimate, shown: Array | float = 1.0) -> list[str]:
+    """Of each coordinate (C,) " (+ flexion)": which way it grows, or the moment that turns it so; "" where the
+    direction has no clinical name.
 
     Args:
-        sign: of what is shown against the model's.
+        shown: sign of what is shown against the model's, one or (C,).
     """
-    if (found := convention_of(coordinate)) is None:
-        return ""
-    return f" (+ {found[0].positive if sign == found[0].sign else found[0].negative})"
+    signs = clinical_signs(estimate) * shown * estimate.is_rotation()
+    ways = []
+    for name, sign in zip(estimate.coordinate_names, signs, strict=True):
+        found = convention_of(name) if sign else None
+        ways.append(f" (+ {found[0].positive if sign > 0.0 else found[0].negative})" if found else "")
+    return ways
 
 
 def mean_angles(names: Sequence[str], rotation: npt.NDArray[np.bool_], coordinates: Array) -> dict[str, float]:
@@ -109,11 +130,10 @@ def reported(estimate: Estimate) -> Reported:
     count = len(estimate.coordinate_names)
     if "zero_offset" not in estimate.data:
         return Reported(np.ones(count), np.zeros(count), ("",) * count, False)
-    found = [convention_of(name) for name in estimate.coordinate_names]
     clinical = estimate.data.attrs["angle_signs"] == "clinical"
-    turned = zip(found, estimate.is_rotation(), strict=True)
-    sign = np.array([float(one[0].sign) if clinical and one and turns else 1.0 for one, turns in turned])
-    way = tuple(f" (+ {one[0].positive})" if one and s < 0.0 else "" for one, s in zip(found, sign, strict=True))
+    against = clinical & (clinical_signs(estimate) < 0.0) & estimate.is_rotation()
+    sign = np.where(against, -1.0, 1.0)
+    way = tuple(name if turned else "" for name, turned in zip(ways_of(estimate, sign), against, strict=True))
     return Reported(sign, estimate.data["zero_offset"].values, way, True)
 
 
@@ -128,6 +148,7 @@ def angle_columns(estimate: Estimate) -> tuple[list[str], Array, list[str]]:
     sign, offset, *_ = shown = reported(estimate)
     values = np.degrees(shown.of(estimate.values("coordinates")))
     clinical = estimate.data.attrs["angle_signs"] == "clinical"
+    signs = clinical_signs(estimate)
     names, columns, lines = [], [], []
     for k in np.flatnonzero(estimate.is_rotation()):
         if estimate.coordinate_names[k] in estimate.held:
@@ -135,7 +156,7 @@ def angle_columns(estimate: Estimate) -> tuple[list[str], Array, list[str]]:
         name = estimate.coordinate_names[k]
         found = convention_of(name)
         line = f"{name}: as the model has it"
-        if clinical and found is not None:
+        if clinical and found is not None and signs[k]:
             convention, side = found
             line = f"{convention.name}{side}: + {convention.positive}, - {convention.negative}"
             name = convention.name + side
