@@ -11,9 +11,9 @@ import dynakin
 from dynakin.bindings import _core
 from dynakin.filter.directions import clinical_signs
 from dynakin.model.definition import load_model
-from dynakin.report.page import Page
 from dynakin.report.sections.joints import angle_section, moment_section
 from dynakin.report.sections.repetitions import side_plots
+from dynakin.report.sections.section import Page
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import angle_columns, convention_of, with_angles
 from dynakin.results.measures.mean_curves import estimate_curves
