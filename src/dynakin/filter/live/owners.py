@@ -87,7 +87,7 @@ class PlateOwners:
         self._near += touches[:, None] & loaded & near
         mine = self._majority() & bears[:, None]
         for p, plate in enumerate(plates):
-            push = float(plate.push[0])
+            push = float(plate.wrench[0, 1])  # not known: whose it was, as long as nobody knows better
             if push <= UNLOADED_N:
                 self._owners[:, p] = False
                 self._between[p] = self._judged[p] = 0
