@@ -72,12 +72,13 @@ def recording_rows(recording: Recording) -> Rows:
     if recording.events:
         kinds = list(dict.fromkeys(f"{event.side} {event.label}".strip().casefold() for event in recording.events))
         rows.append(("In the file", f"{plural(len(recording.events), 'event')} ({', '.join(kinds)})."))
+    up = main_push(recording.plates)
     for plate in recording.plates:
-        push = plate.force @ main_push(recording.plates)
+        push = plate.force @ up
         if not np.isfinite(push).any():
             rows.append(("Plates", f"{plate.name}: not measured."))
             continue
-        across = np.linalg.norm(plate.force - np.outer(push, main_push(recording.plates)), axis=1)
+        across = np.linalg.norm(plate.force - np.outer(push, up), axis=1)
         load = np.where(across > np.abs(push), across, push)  # of a handle, too; what pulls along it is none
         loaded = 100.0 * float(np.mean(np.nan_to_num(load) > LOADED_N))
         text = f"{plate.name}: up to {np.nanmax(load):.0f} N, mean {np.nanmean(push):.1f} N, loaded {loaded:.0f} %."

@@ -86,6 +86,11 @@ def named_forces(path: Path) -> Path | None:
     return None
 
 
+def forces_each(trials: Sequence[Path], forces: Sequence[Path]) -> list[Path | None]:
+    """The ground forces that were given, or by `named_forces` of each trial."""
+    return [*forces] or [named_forces(trial) for trial in trials]
+
+
 def refuse_copies_of(cases: Sequence[Case]) -> None:
     """A mean over trials would count a copy twice, as if it had no deviation; and predict it because it knows it.
 

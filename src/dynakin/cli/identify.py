@@ -102,14 +102,14 @@ def _check_output(output: Path) -> None:
 
 def _read(paths: list[Path], forces: list[Path], static: Path | None) -> tuple[list[Recording], Recording | None]:
     """The trials and the standing one, each with the ground forces given or found in its folder."""
-    from dynakin.cli.compare_inputs import named_forces, told_apart
+    from dynakin.cli.compare_inputs import forces_each, named_forces, told_apart
     from dynakin.recordings.read import read
     from dynakin.results.naming import plural
 
     if forces and len(forces) != len(paths):
         counted = f"{plural(len(forces), 'force file')} for {plural(len(paths), 'trial')}"
         raise ConfigError(f"identify: {counted}, expected one a trial or none")
-    chosen: list[Path | None] = [*forces] or [named_forces(path) for path in paths]
+    chosen = forces_each(paths, forces)
     recordings = [read(path, force) for path, force in zip(paths, chosen, strict=True)]
     names = told_apart(recordings)
     recordings = [replace(recording, name=name) for recording, name in zip(recordings, names, strict=True)]

@@ -70,7 +70,7 @@ def grid(
 
     A run that was stopped goes on where it was when it is started again with the same folder.
     """
-    from dynakin.cli.compare_inputs import cases_of, named_forces
+    from dynakin.cli.compare_inputs import cases_of, forces_each
     from dynakin.report.paper_figures.figures import save_sensitivity_figures
     from dynakin.studies.engine.journal import ROWS, Journal, open_folder
     from dynakin.studies.engine.pools import open_pool
@@ -78,9 +78,7 @@ def grid(
     from dynakin.studies.tuning.output import criteria_text, grid_text, write_grid
 
     preset = given.pop("preset", None)
-    cases = cases_of(
-        trials or [], forces or [named_forces(path) for path in trials or []], [], CUTOFF_HZ, given, "tune grid"
-    )
+    cases = cases_of(trials or [], forces_each(trials or [], forces or []), [], CUTOFF_HZ, given, "tune grid")
     axes = axes_of(vary or [], cases)
     check_size(axes)
     base = preset or ("paper" if not vary and cases[0].config.grid is None else cases[0].config.preset)
@@ -123,16 +121,14 @@ def fit(
 
     A run that was stopped goes on where it was when it is started again with the same folder.
     """
-    from dynakin.cli.compare_inputs import cases_of, named_forces
+    from dynakin.cli.compare_inputs import cases_of, forces_each
     from dynakin.studies.engine.journal import ROWS, Journal, open_folder
     from dynakin.studies.engine.pools import open_pool
     from dynakin.studies.tuning.fit import Fitter, belongs_to_fit, usual_names
     from dynakin.studies.tuning.output import figures_text, recommendation, settings_text, write_fit
 
     preset = given.pop("preset", None)
-    cases = cases_of(
-        trials or [], forces or [named_forces(path) for path in trials or []], [], CUTOFF_HZ, given, "tune fit"
-    )
+    cases = cases_of(trials or [], forces_each(trials or [], forces or []), [], CUTOFF_HZ, given, "tune fit")
     base = preset or cases[0].config.preset
     shared = shared_of(cases, base)
     names = tuple(vary) if vary else usual_names(shared.base, shared.floating)

@@ -169,7 +169,8 @@ class LiveFeet:
         aloft = stances.moves & ~bears & (stands.sum() > stands)  # high alone may be a pedal: no later stance is known
         plates = [] if wrenches is None else self._plates(wrenches)
         off = self._owners.look(plates, stances, bears)
-        for p, (away_m, other) in self._owners.misgiven.items():
+        while self._owners.misgiven:
+            p, (away_m, other) = self._owners.misgiven.popitem()
             owner = self._assigned[self.plates[p]]
             found = others_plate(self.plates[p], owner, f"the {owner} foot", away_m, self.feet[other])
             self._say(f"{found} From now on it is the foot's that stands on it; before, moments were wrong.")

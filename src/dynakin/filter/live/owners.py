@@ -28,7 +28,7 @@ class PlateOwners:
 
     Attributes:
         misgiven: plate -> (how far the declared foot was, m, the foot that stood on it), of plates that cannot be the
-            declared foot's; from then on these are as those of which nothing is declared.
+            declared foot's, until who says so takes them out; from then on nothing is declared of these.
     """
 
     def __init__(self, feet: int, plates: int, assigned: dict[int, int], given: list[int]) -> None:

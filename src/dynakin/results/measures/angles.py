@@ -42,20 +42,23 @@ CONVENTIONS = {
     "hip_flexion": Convention("hip_flexion", 1, "flexion", "extension", "+z"),
     "hip_adduction": Convention("hip_adduction", 1, "adduction", "abduction", "+x"),
     "hip_rotation": Convention("hip_rotation", 1, "internal rotation", "external rotation", "+y"),
-    "hip": Convention("hip_flexion", 1, "flexion", "extension", "+z"),
     "knee_angle": Convention("knee_flexion", 1, "flexion", "extension", "-z"),
-    "knee": Convention("knee_flexion", 1, "flexion", "extension", "-z"),
     "ankle_angle": Convention("ankle_dorsiflexion", 1, "dorsiflexion", "plantarflexion", "+z"),
-    "ankle": Convention("ankle_dorsiflexion", 1, "dorsiflexion", "plantarflexion", "+z"),
     "subtalar_angle": Convention("subtalar_inversion", 1, "inversion", "eversion", "+x"),
     "lumbar_extension": Convention("trunk_flexion", -1, "flexion", "extension", "-z"),
-    "lumbar": Convention("trunk_flexion", -1, "flexion", "extension", "-z"),
     "arm_flex": Convention("shoulder_flexion", 1, "flexion", "extension", "+z"),
-    "shoulder": Convention("shoulder_flexion", 1, "flexion", "extension", "+z"),
     "arm_add": Convention("shoulder_adduction", 1, "adduction", "abduction", "+x"),
     "elbow_flex": Convention("elbow_flexion", 1, "flexion", "extension", "+z"),
-    "elbow": Convention("elbow_flexion", 1, "flexion", "extension", "+z"),
 }
+_PLANAR = {
+    "hip": "hip_flexion",
+    "knee": "knee_angle",
+    "ankle": "ankle_angle",
+    "lumbar": "lumbar_extension",
+    "shoulder": "arm_flex",
+    "elbow": "elbow_flex",
+}
+CONVENTIONS |= {name: CONVENTIONS[whole] for name, whole in _PLANAR.items()}
 
 
 def convention_of(coordinate: str) -> tuple[Convention, str] | None:
