@@ -123,6 +123,23 @@ def test_section_without_an_end(tmp_path: Path, whole: bytes) -> None:
     assert "expected an end by byte 1536" in message
 
 
+def test_section_that_ends_with_its_last_byte(tmp_path: Path, whole: bytes) -> None:
+    end = 1536
+    last = spot(whole, "EZC3D", "CONTACT", "offset")
+    at = last + struct.unpack("<H", whole[last : last + 2])[0]  # of the section's terminator
+    group = whole[spot(whole, "EZC3D", "CONTACT", "group")]
+    filling = b""
+    while left := end - 1 - at - len(filling):  # parameters of bytes until nothing is left behind the terminator
+        count = min(left, 200 if left > 220 else 100) - 11
+        assert count >= 0
+        record = bytes([1, 1, count]) + bytes(count) + b"\0"
+        filling += bytes([3, group]) + b"PAD" + struct.pack("<H", 2 + len(record)) + record
+    path = tmp_path / "a.c3d"
+    path.write_bytes(whole[:at] + filling + b"\0" + whole[end:])
+    assert path.stat().st_size == len(whole)
+    assert read_c3d(path).n_frames == T
+
+
 @pytest.mark.parametrize(
     ("group", "name", "value", "expected"),
     [

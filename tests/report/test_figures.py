@@ -96,6 +96,15 @@ def test_bands_of_derived_moments_do_not_press_the_lines_flat() -> None:
     assert -125.0 < low < -90.0 and 0.0 < high < 35.0  # the lines go from -90 to 0 N m
 
 
+def test_a_band_that_is_too_wide_to_draw_is_said_in_numbers() -> None:
+    spatial = make_spatial()
+    sd = spatial.data["coordinates_sd"].copy(data=np.full(spatial.data["coordinates_sd"].shape, np.radians(1e-3)))
+    sd[{"coordinate": spatial.data["coordinate"].values.tolist().index("knee_angle_l")}] = np.radians(200.0)
+    figure = draw_figure("angles", replace(spatial, data=spatial.data.assign(coordinates_sd=sd)))
+    titles = [a.get_title(loc="left") for a in figure.axes]
+    assert "Knee angle, deg\n(left 2 sd: 400)" in titles and "Hip flexion, deg" in titles
+
+
 def test_one_figure_is_drawn_by_its_name_and_shown_by_a_notebook(jointed: Estimate) -> None:
     figure = draw_figure("angles", jointed)
     assert figure._repr_png_()[:4] == b"\x89PNG"

@@ -37,7 +37,9 @@ def test_signs_and_zero_of_the_table(estimate: Estimate, tmp_path: Path) -> None
     np.testing.assert_allclose(columns["trunk_flexion"], -(degrees[:, 4] + 3.0), rtol=5e-8, atol=1e-9)
     assert "slide" not in columns  # a translation is no angle
     assert compute_metrics(asked)["angles"]["zero_deg"]["knee"] == pytest.approx(5.0)
-    assert "knee_flexion: + flexion, - extension; zero at 5.00 deg" in (tmp_path / "out" / "angles.sto").read_text()
+    written = (tmp_path / "out" / "angles.sto").read_text()
+    assert "knee_flexion: + flexion, - extension; zero at 5.00 deg of the model" in written
+    assert "trunk_flexion: + flexion, - extension; zero at -3.00 deg of the model" in written  # the sign is turned
     assert compute_metrics(estimate)["angles"] is None
     np.testing.assert_array_equal(asked.data["coordinates"].values, estimate.data["coordinates"].values)
 

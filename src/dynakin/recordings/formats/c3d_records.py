@@ -84,9 +84,9 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[
     anew = bytearray(section[:4])
     at = 4
     while True:
-        length, group = struct.unpack("bb", _take(section, at, 2, start, path, "the next record"))
-        if length == 0:
+        if _take(section, at, 1, start, path, "the next record") == b"\0":  # may be the section's last byte
             break
+        length, group = struct.unpack("bb", _take(section, at, 2, start, path, "the next record"))
         name = _take(section, at + 2, abs(length), start, path, "a name").split(b"\0")[0].decode("latin-1").upper()
         what = f"{'group' if group < 0 else 'parameter'} {name!r} at byte {start + at}"
         here = at + 2 + abs(length)

@@ -114,11 +114,14 @@ def angles_figure(estimate: Estimate, comparison: ComparedTrial | None = None) -
             if not wide:
                 axes.fill_between(estimate.time, own - half, own + half, color=colour, alpha=0.18, linewidth=0)
             usual = float(np.nanmedian(half)) if np.isfinite(half).any() else np.nan
-            notes.append(f"2 sd: {number(usual, unit, digits=2)}{' (too wide)' if wide else ''}")
+            if alone:
+                notes.append(f"2 sd: {number(usual, unit, digits=2)}{' (too wide)' if wide else ''}")
+            elif wide:
+                notes.append(f"({styles[side].label} 2 sd: {number(usual, digits=2)})".replace("( ", "("))
         if alone:
             axes.margins(y=0.12)
             axes.set_xlabel("\n".join(notes))
-        axes.set_title(f"{joint.title}, {unit}")
+        _title(axes, (f"{joint.title}, {unit}", *(() if alone else notes)), 32)
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
     figure.supxlabel("time, s", fontsize=8, color=QUIET)
     if alone:
@@ -159,7 +162,7 @@ def moments_figure(estimate: Estimate, comparison: ComparedTrial | None = None) 
     figure.supxlabel("time, s", fontsize=8, color=QUIET)
     figure.supylabel("moment, N m", fontsize=8, color=QUIET)
     shown = [k for joint in joints for k in joint.columns.values()]
-    _key(figure, every[0], [*_side_styles(estimate, joints), *source_key(source[:, shown])], band=QUIET, columns=6)
+    _key(figure, every[0], [*_side_styles(estimate, joints), *source_key(source[:, shown])], band=QUIET)
     return figure
 
 

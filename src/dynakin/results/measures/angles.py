@@ -148,7 +148,7 @@ def angle_columns(estimate: Estimate) -> tuple[list[str], Array, list[str]]:
     from dynakin.results.measures.facing import facing
 
     estimate = facing(estimate)
-    sign, offset, *_ = shown = reported(estimate)
+    shown = reported(estimate)
     values = np.degrees(shown.of(estimate.values("coordinates")))
     clinical = estimate.data.attrs["angle_signs"] == "clinical"
     signs = clinical_signs(estimate)
@@ -165,5 +165,5 @@ def angle_columns(estimate: Estimate) -> tuple[list[str], Array, list[str]]:
             name = convention.name + side
         names.append(name)
         columns.append(values[:, k])
-        lines.append(f"{line}; zero at {np.degrees(sign[k] * offset[k]) + 0.0:.2f} deg of the model")
+        lines.append(f"{line}; zero at {np.degrees(shown.offset[k]) + 0.0:.2f} deg of the model")
     return names, np.column_stack(columns) if columns else np.empty((len(values), 0)), lines
