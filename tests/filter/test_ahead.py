@@ -188,8 +188,8 @@ def test_while_the_motion_is_lost_nothing_is_expected() -> None:
 
 def test_who_does_not_ask_gets_none() -> None:
     recording = simulate_squat(seed=2, duration_s=5.0).recording
-    with pytest.raises(ConfigError, match="does not look ahead, expected Estimator.start"):
+    with pytest.raises(ConfigError, match=r"does not look ahead, expected Estimator\.start"):
         estimator().start(recording).ahead()
     for wrong in (-0.1, np.nan, np.inf):
-        with pytest.raises(ConfigError, match="ahead_s: .* expected 0"):
+        with pytest.raises(ConfigError, match=r"ahead_s: .* expected 0"):
             estimator().start(recording, ahead_s=wrong)

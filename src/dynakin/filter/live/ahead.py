@@ -142,7 +142,7 @@ class LookAhead:
             "speeds": speeds,
             "markers": _core.marker_positions(self._model, state),
             "wrench": weight + about_origin(self._past[-1].expected),
-            "wrench_sd": np.sqrt(np.diagonal(about_origin(about_origin(errors).T))),
+            "wrench_sd": np.sqrt(np.maximum(np.diagonal(about_origin(about_origin(errors).T)), 0.0)),
         }
         return Ahead(self._time_s + self.horizon_s, values, self._labels)
 
