@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.errors import ModelError, StreamError
+from dynakin.errors import ConfigError, ModelError, StreamError
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.samples import sample_arrays
 from dynakin.recordings.recording import Recording
@@ -126,6 +126,26 @@ def test_a_lag_is_shown_as_its_delay(squat: Recording) -> None:
     last = frames[-1]
     assert last.smoothed is not None and last.published is last.smoothed
     assert last.status.delay_s == pytest.approx(0.2, abs=1e-6) == last.estimate.time_s - last.smoothed.time_s
+
+
+def test_a_session_that_looks_ahead_says_what_is_expected(squat: Recording) -> None:
+    """Of the sample, not of what is published late; also after a restart, and only where it is asked for."""
+    frames, _, live = run(Replay(squat, speed=0.0), ahead_s=0.1)
+    first = frames[0].estimate.time_s
+    held, expected = [], []
+    for k, frame in enumerate(frames[:-10]):
+        assert frame.ahead is not None and frame.ahead.time_s == pytest.approx(frame.estimate.time_s + 0.1)
+        then = frames[k + 10].estimate
+        if then.time_s > first + 1.5:
+            held.append(then.wrench["fy"] - frame.estimate.wrench["fy"])
+            expected.append(then.wrench["fy"] - frame.ahead.wrench["fy"])
+    assert live.fusion.markers.rate_hz == pytest.approx(100.0)
+    assert np.std(expected) < 0.6 * np.std(held)
+    live.restart()
+    assert live.tracker.ahead() is None
+    assert all(frame.ahead is None for frame in run(Replay(squat, speed=0.0, duration_s=3.0))[0])
+    with pytest.raises(ConfigError, match=r"ahead_s: -0\.1 s, expected 0"):
+        Live(estimator(), [], ahead_s=-0.1)
 
 
 def test_a_live_session_with_a_lag_gives_what_a_recording_with_it_gives(squat: Recording) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import dynakin
@@ -17,7 +16,7 @@ from dynakin.simulation.trial import simulate
 from dynakin.units import COMPONENTS
 from dynakin.validation.case import Setup
 from dynakin.validation.unseen import unseen, unseen_figures
-from dynakin.validation.unseen_in_space import carried_on, left_out_groups
+from dynakin.validation.unseen_in_space import left_out_groups
 from dynakin.validation.yardsticks import Figures
 
 FILTER, CLASSICAL = "EKF (default)", "IK + ID (6 Hz)"
@@ -51,16 +50,6 @@ def test_no_two_markers_of_a_group_help_each_other(walk: SimulatedTrial, setup: 
     assert len(groups) < 15
 
 
-def test_a_motion_is_carried_on_by_its_speed_and_a_little_by_its_acceleration() -> None:
-    """The exact integrals of an acceleration that fades, by small steps."""
-    q, speed, acceleration = 1.0, 2.0, 30.0
-    step = 1e-5
-    for _ in range(10000):
-        q, speed, acceleration = q + step * speed, speed + step * acceleration, acceleration * (1.0 - step / 0.05)
-    found = carried_on(np.array([1.0, 2.0, 30.0]).reshape(3, 1, 1), 0.1)
-    np.testing.assert_allclose(found.ravel(), [q, speed, acceleration], rtol=1e-3)
-
-
 def test_filter_and_classical_method_stand_beside_each_other(figures: Figures) -> None:
     rows = unseen([figures])
     methods = {FILTER, CLASSICAL, "IK + ID (12 Hz)"}
@@ -84,6 +73,9 @@ def test_what_is_known_without_errors_is_foretold_well(figures: Figures) -> None
         assert push is not None and push < 0.2 * 70.0 * 9.81  # live, from 50 Hz: the filter's is late
     ahead = {method: figures["100 ms ahead", "markers", method] for method in (FILTER, "persistence")}
     assert ahead[FILTER] < 0.4 * ahead["persistence"]  # type: ignore[operator]
+    push = {method: figures["100 ms ahead", "fy", method] for method in (FILTER, CLASSICAL, "persistence")}
+    assert push[FILTER] < 0.6 * push["persistence"]  # type: ignore[operator]
+    assert push[FILTER] < push[CLASSICAL]  # type: ignore[operator]
 
 
 @pytest.mark.nightly

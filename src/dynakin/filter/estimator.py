@@ -159,6 +159,7 @@ class Estimator:
         static: Recording | None = None,
         lag_s: float = 0.0,
         rate_hz: float | None = None,
+        ahead_s: float = 0.0,
     ) -> Tracker:
         """A tracker that is ready for its first sample, of a recording to calibrate on or of a calibrated model.
 
@@ -166,6 +167,7 @@ class Estimator:
             static: as in `run`; a calibrated model needs none.
             lag_s: by which `Tracker.delayed` lies behind `Tracker.step`, s, as many frames as that is about; 0: none.
             rate_hz: of the samples, where not that of the recording. A calibrated model with a lag needs it.
+            ahead_s: by which `Tracker.ahead` looks ahead of `Tracker.step`, s; 0: it does not.
 
         Raises:
             ModelError, RecordingError: as in `run`. ConfigError: the noise does not fit the model or the lag.
@@ -178,7 +180,8 @@ class Estimator:
             raise ConfigError("lag_s: a lag needs the rate of the samples, expected rate_hz")
         calibrated = self.calibrate(source, static=static) if isinstance(source, Recording) else source
         plates = [plate.name for plate in source.plates] if isinstance(source, Recording) else []
-        return Tracker(calibrated, self.noise, self.estimate, lag_frames(lag_s, rate_hz or 0.0), plates, self.plates)
+        lag = lag_frames(lag_s, rate_hz or 0.0)
+        return Tracker(calibrated, self.noise, self.estimate, lag, plates, self.plates, ahead_s)
 
     def run(
         self,

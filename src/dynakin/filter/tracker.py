@@ -13,6 +13,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.contacts import ContactLoads, stands_off_plates
 from dynakin.filter.core_filter import core_filter, smoothed
+from dynakin.filter.live.ahead import Ahead, LookAhead, check_ahead
 from dynakin.filter.live.feet import LiveFeet
 from dynakin.filter.live.found_noise import FoundNoise
 from dynakin.filter.live.steps import Stepped, Steps
@@ -41,6 +42,7 @@ class Tracker:
         lag: frames by which `delayed` lies behind `step`; 0: there is none.
         plates: names of all force plates; not given: those that samples have had so far.
         assigned: plate -> foot or declared contact, as ``plates`` of `Estimator`.
+        ahead_s: by which `ahead` looks ahead of `step`, s; 0: there is none.
 
     Attributes:
         feet: of a floating model, from its first `step` on: which feet its plates carry. Its ``news()`` are sentences.
@@ -48,7 +50,8 @@ class Tracker:
         core_model: it, compiled.
 
     Raises:
-        ConfigError: the noise names a marker that the model does not use, or has no smoother for a lag.
+        ConfigError: the noise names a marker that the model does not use, or has no smoother for a lag; ``ahead_s`` is
+            negative or no number.
     """
 
     def __init__(
@@ -59,6 +62,7 @@ class Tracker:
         lag: int = 0,
         plates: Collection[str] = (),
         assigned: Mapping[str, str] | None = None,
+        ahead_s: float = 0.0,
     ) -> None:
         self.calibrated, self.core_model, self._filter = core_filter(calibrated, noise, estimate)
         self.noise, self.estimate, self.lag, self.plates = noise, tuple(estimate), lag, tuple(plates)
@@ -74,6 +78,7 @@ class Tracker:
         self._time: float | None = None
         self._latest: StepEstimate | None = None
         self._steps = Steps(self.core_model, noise, lag)
+        self._look_ahead = LookAhead(self.core_model, ahead_s) if check_ahead(ahead_s) else None
         self._found = FoundNoise() if noise.calibrates(bool(calibrated.feet)) else None
 
     def fresh(self) -> Tracker:
@@ -82,7 +87,8 @@ class Tracker:
 
     def changed(self, noise: Noise) -> Tracker:
         """Another one, at the start of the same model with other noise, which asks for the same states."""
-        return Tracker(self.calibrated, noise, self.estimate, self.lag, self.plates, self._assigned)
+        ahead_s = 0.0 if self._look_ahead is None else self._look_ahead.horizon_s
+        return Tracker(self.calibrated, noise, self.estimate, self.lag, self.plates, self._assigned, ahead_s)
 
     @property
     def state(self) -> Array:
@@ -191,6 +197,11 @@ class Tracker:
         step = Stepped(sample.time_s, loads, sources, segments, unmeasured, blind, plates_sd, unseen, used)
         self._steps.add(step)
         self._latest = self._estimate(step, sample.time_s, self.state, report)
+        if self._look_ahead is not None:
+            if report.tracking in NO_ESTIMATE:
+                self._look_ahead.interrupted()
+            else:
+                self._look_ahead.look(sample.time_s, self.state)
         return self._latest
 
     def _on_plates(self, sample: Sample, markers: Array) -> ContactLoads:
@@ -226,6 +237,16 @@ class Tracker:
         step = self._delayed_step(lag)
         time = self._time - lag.delay_s
         return self._estimate(step, time, lag.state, None)
+
+    def ahead(self) -> Ahead | None:
+        """What is expected ``ahead_s`` after the last step; None before the first one, and where the motion is lost.
+
+        Raises:
+            ConfigError: the tracker was started without.
+        """
+        if self._look_ahead is None:
+            raise ConfigError("ahead: the tracker does not look ahead, expected Estimator.start(..., ahead_s=SECONDS)")
+        return self._look_ahead.expected()
 
     def deviations(self, *, delayed: bool = False) -> dict[str, Labelled]:
         """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step. They

@@ -11,6 +11,7 @@ import numpy as np
 from dynakin.blas import one_blas_thread
 from dynakin.errors import DivergenceError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.live.ahead import check_ahead
 from dynakin.filter.samples import Sample
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, warning
@@ -45,6 +46,7 @@ class Live:
         sinks: where the estimates go.
         lag_s: by how much the estimates are late, so that the frames until then help to make them; None: the
             recommended `LIVE_LAG_S`, or 0 where the noise settings have no smoother.
+        ahead_s: by which ``LiveFrame.ahead`` looks ahead of the sample; 0: not at all.
         delay_s: longest wait for what is missing (`Fusion`).
         standing_s: how long the person stands still at the start; None: 2 s, of a recording of less than 6 s 0.4.
         standing_wait_s: after so long without, the quietest moment since then is taken; None: 20 s, of a recording
@@ -63,6 +65,7 @@ class Live:
         sinks: Sequence[Sink] = (),
         *,
         lag_s: float | None = None,
+        ahead_s: float = 0.0,
         delay_s: float = DELAY_S,
         standing_s: float | None = None,
         standing_wait_s: float | None = None,
@@ -74,7 +77,7 @@ class Live:
         say: Callable[[str], None] = print,
     ) -> None:
         self.estimator, self.sinks = estimator, SinkGroup(sinks, record, self.say)
-        self.lag_s = live_lag(lag_s, estimator.noise)
+        self.lag_s, self.ahead_s = live_lag(lag_s, estimator.noise), check_ahead(ahead_s)
         self.delay_s = delay_s
         self._standing_given = (standing_s, standing_wait_s)
         self.standing_s, self.standing_wait_s = _standing(np.inf, *self._standing_given)
@@ -313,6 +316,7 @@ class Live:
                 known=self.known,
                 lag_s=self.lag_s,
                 rate_hz=self.fusion.markers.rate_hz,
+                ahead_s=self.ahead_s,
             )
         except ModelError as error:
             if waited:
@@ -380,7 +384,8 @@ class Live:
             deviations = tracker.deviations(delayed=tracker.lag > 0)
         status = monitor.status(self.fusion, fused, whole, estimate, smoothed, state, tracker.verdicts)
         published = smoothed if tracker.lag else estimate
-        frame = LiveFrame(estimate, smoothed, published, fused, state, deviations, status)
+        ahead = tracker.ahead() if self.ahead_s else None
+        frame = LiveFrame(estimate, smoothed, published, fused, state, deviations, status, ahead)
         self.sinks.frame(frame)
         monitor.published(sample.time_s, time.monotonic() - fused.arrived_s)
         news = [] if feet is None else feet.news()

@@ -152,13 +152,14 @@ def begin(
     known: Mapping[str, tuple[float, float]] | None = None,
     lag_s: float = 0.0,
     rate_hz: float | None = None,
+    ahead_s: float = 0.0,
 ) -> tuple[Tracker, list[Message], bool | None]:
     """Calibrate the model on the standing person.
 
     Args:
         static: another recording of the person standing: lengths and places come from it.
         known: value and standard deviation of constants from an earlier session, by their names.
-        lag_s, rate_hz: as in `Estimator.start`.
+        lag_s, rate_hz, ahead_s: as in `Estimator.start`.
 
     Returns:
         what is ready to step, what there is to say, and whether the plates can be used; None where nobody stands on
@@ -168,11 +169,11 @@ def begin(
         ModelError, RecordingError: model, markers and plates do not fit.
     """
     rate_hz = rate_hz or standing.rate
-    tracker = estimator.start(standing, static=static, lag_s=lag_s, rate_hz=rate_hz)
+    tracker = estimator.start(standing, static=static, lag_s=lag_s, rate_hz=rate_hz, ahead_s=ahead_s)
     initial = tracker.calibrated
     said = warnings_of(initial.messages)
     if known:
-        tracker = estimator.start(_continued(initial, known), lag_s=lag_s, rate_hz=rate_hz)
+        tracker = estimator.start(_continued(initial, known), lag_s=lag_s, rate_hz=rate_hz, ahead_s=ahead_s)
         said.append(note("calibration", f"Lengths, marker places and masses go on from {len(known)} saved values."))
     if not standing.plates:
         return tracker, said, True

@@ -8,10 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dynakin.bindings import _core
 from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.filter.core_filter import filter_settings
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.measurements import Measurements
 from dynakin.progress import Progress
@@ -31,6 +29,7 @@ from dynakin.validation.yardsticks import (
     Figures,
     Judged,
     ahead,
+    expected_ahead,
     held,
     line,
     span_frames,
@@ -94,7 +93,7 @@ def unseen_figures(
 
     - Plates withheld: lengths and inertia from the first half, frozen; the second half from markers alone.
     - Marker left out: from the end of the adaptation on, one marker is not given to the filter; its error there.
-    - Ahead: from each frame's estimate the state is predicted ``horizon_s`` on, without an update.
+    - Ahead: what is expected from each frame's estimate ``horizon_s`` on (`LookAhead`).
 
     For each also: the last value held, and the last slope of the raw data carried on. A floating model's are those of
     `figures_in_space`.
@@ -158,23 +157,13 @@ def _left_out(estimator: Estimator, preset: str, trial: Judged, progress: Progre
 
 
 def _ahead(estimator: Estimator, preset: str, trial: Judged, horizon_s: float) -> Figures:
-    time, initial = trial.measured.time, trial.calibrated
+    time, tracker = trial.measured.time, estimator.start(trial.calibrated)
     yardstick = ahead(horizon_s)
-    frames = span_frames(time, horizon_s)
-    states = estimator.start(initial).run_arrays(trial.measured)["state"]
-    model = _core.Model(initial.spec)
-    settings = filter_settings(initial, estimator.noise, model.layout, estimator.estimate)
-    covariance = np.diag(initial.sd0**2)  # the mean's prediction does not depend on it
-    probe = _core.Filter(model, settings, initial.x0, covariance)
-    markers, wrench = (np.full_like(values, np.nan) for values in (trial.measured.markers, trial.measured.wrench))
-    for k in range(len(time) - frames):
-        probe.reset(states[k], covariance)
-        probe.predict(float(time[k + frames] - time[k]))
-        markers[k + frames] = _core.marker_positions(model, probe.state)
-        wrench[k + frames] = _core.wrench(model, probe.state)
+    states = tracker.run_arrays(trial.measured)["state"]
+    expected = expected_ahead(tracker.core_model, time, states, horizon_s)
     figures: Figures = {}
-    guesses = {f"EKF ({preset})": (markers, wrench)} | trial.raw_ahead(frames)
+    guesses = {f"EKF ({preset})": expected} | trial.raw_ahead(span_frames(time, horizon_s))
     for method, (places, forces) in guesses.items():
-        figures |= trial.markers(yardstick, method, places, range(markers.shape[1]))
+        figures |= trial.markers(yardstick, method, places, range(places.shape[1]))
         figures |= trial.wrench(yardstick, method, forces)
     return with_mean(yardstick, figures)

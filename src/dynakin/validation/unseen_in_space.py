@@ -36,19 +36,14 @@ from dynakin.validation.yardsticks import (
     Figures,
     Judged,
     ahead,
-    persisted,
+    expected_ahead,
     span_frames,
     with_mean,
 )
 
-_BLOCKS = ("coordinates", "speeds", "accelerations")
 _PAST_S = 0.5
 """Of the recording until now, from which the classical method looks ahead: the low-pass forgets in less."""
 _FEWEST_FRAMES = 8  # for a spline's second derivative, at a low rate
-_FADE_S = 0.05
-"""In which accelerations fade as states are carried on: nobody keeps one for 100 ms. Chosen for the filter on
-`squats1` and `MH0222_BP06` of 0, 20, 30, 50, 80, 150 ms and for ever; the classical method's, which see one side only
-at the end of what is known, matter by 1 %."""
 
 
 def figures_in_space(
@@ -59,9 +54,8 @@ def figures_in_space(
     - Marker left out: never given, so that its place is the calibration's; in groups of markers that are neither on one
       segment nor on neighbours (`left_out_groups`), because a whole body has too many for a run each.
     - Plates withheld: the whole recording without them, judged where they measure all that acts.
-    - Ahead: from what is known until each frame, ``horizon_s`` on. Coordinates go on by their speeds and by
-      accelerations that fade (`carried_on`): the filter's of its live state, the classical method's of a low-pass of
-      what lies before.
+    - Ahead: from what is known until each frame, ``horizon_s`` on, as `LookAhead` says it of the filter's live states
+      and of the classical method's, by a low-pass of what lies before.
 
     Wrenches are along the way the person faces, moments about the floor's point below the pelvis: about a laboratory's
     origin they would be forces times metres.
@@ -102,8 +96,8 @@ def figures_in_space(
         stepped()
     for cutoff, motion in rigid_motions(trial.calibrated, time, markers, cutoffs).items():
         withheld |= trial.wrench(WITHHELD, inverse_name(cutoff), motion.wrench())
-    for cutoff, motion in _classical_ahead(trial, cutoffs, horizon_s).items():
-        ahead_of[inverse_name(cutoff)] = motion.markers(), motion.wrench()
+    for cutoff, expected in _classical_ahead(trial, cutoffs, horizon_s).items():
+        ahead_of[inverse_name(cutoff)] = expected
     ahead_of |= trial.raw_ahead(span_frames(time, horizon_s))
     return with_mean(LEFT_OUT, left_out) | withheld | _ahead_figures(trial, ahead(horizon_s), ahead_of)
 
@@ -148,41 +142,26 @@ def _without_plates(estimator: Estimator, ready: Prepared, recording: Recording,
     return ready.calibrated.ground.wrench_to_ground(estimate.ground.wrench_to_laboratory(wrench))
 
 
-def carried_on(motion: Array, horizon_s: float) -> Array:
-    """Coordinates, speeds and accelerations (3, T, C) ``horizon_s`` later, accelerations fading in `_FADE_S`."""
-    q, speed, acceleration = motion
-    left = np.exp(-horizon_s / _FADE_S)
-    gained = _FADE_S * (1.0 - left)
-    later = q + horizon_s * speed + _FADE_S * (horizon_s - gained) * acceleration
-    return np.stack([later, speed + gained * acceleration, left * acceleration])
-
-
 def _ahead(estimator: Estimator, ready: Prepared, horizon_s: float) -> tuple[Array, Array]:
-    """Places (T, M, 3) and wrench (T, 6) as the live state of ``horizon_s`` before says them."""
+    """Places (T, M, 3) and wrench (T, 6) as the live states until ``horizon_s`` before say them."""
     estimate, tracker = estimator.follow(replace(ready, lag_s=0.0))
-    states = _of(estimate, "state", evaluation_window(estimate.time)).copy()
-    blocks = [slice(o, o + n) for o, n in (tracker.core_model.layout.blocks[name] for name in _BLOCKS)]
-    carried = carried_on(np.stack([states[:, block] for block in blocks]), horizon_s)
-    for block, values in zip(blocks, carried, strict=True):
-        states[:, block] = values
-    later = persisted(states, span_frames(estimate.time, horizon_s))
-    motion = RigidMotion(tracker.core_model, np.ascontiguousarray(later))  # with what else the state holds, as it was
-    return motion.markers(), motion.wrench()
+    states = _of(estimate, "state", evaluation_window(estimate.time))
+    return expected_ahead(tracker.core_model, estimate.time, states, horizon_s)
 
 
-def _classical_ahead(trial: Judged, cutoffs: tuple[float, ...], horizon_s: float) -> dict[float, RigidMotion]:
-    """The rigid model as the angles of the half second until ``horizon_s`` before say it."""
+def _classical_ahead(trial: Judged, cutoffs: tuple[float, ...], horizon_s: float) -> dict[float, tuple[Array, Array]]:
+    """The same of the rigid model as the angles of the half second until ``horizon_s`` before say it."""
     time, model = trial.measured.time, fixed_model(trial.calibrated)
     coordinates = inverse_kinematics(trial.calibrated, filled(time, trial.measured.markers))
-    past, frames = max(span_frames(time, _PAST_S), _FEWEST_FRAMES), span_frames(time, horizon_s)
+    past = max(span_frames(time, _PAST_S), _FEWEST_FRAMES)
     unknown = np.full((past - 1, coordinates.shape[1]), np.nan)
     found = {}
     for cutoff in cutoffs:
         low_passed = smooth(time[:past], np.eye(past), cutoff)  # linear: the share of each frame in the last one
         shares = (low_passed.values[-1], low_passed.rates[-1], low_passed.seconds[-1])
         windows = sliding_window_view(coordinates, past, axis=0)  # (T - past + 1, F, past)
-        now = np.stack([np.vstack([unknown, windows @ share]) for share in shares])
-        found[cutoff] = RigidMotion.of(model, *(persisted(part, frames) for part in carried_on(now, horizon_s)))
+        now = RigidMotion.of(model, *(np.vstack([unknown, windows @ share]) for share in shares))
+        found[cutoff] = expected_ahead(model, time, now.states, horizon_s)
     return found
 
 

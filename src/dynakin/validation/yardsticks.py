@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import Array
+from dynakin.bindings import _core
+from dynakin.filter.live.ahead import LookAhead
 from dynakin.filter.measurements import Measurements
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.times import step_of
@@ -89,6 +91,21 @@ class Judged:
 SLOPE_S = 0.01
 """Span of the slope. Chosen in favour of the extrapolation: the best of 10, 20, 50 and 100 ms for the markers and
 the plates of a real squat, 100 ms ahead."""
+
+
+def expected_ahead(model: _core.Model, time: Array, states: Array, horizon_s: float) -> tuple[Array, Array]:
+    """Markers (T, M, 3) and wrench (T, 6) of each frame as `LookAhead` expects them ``horizon_s`` before, from states
+    (T, n); NaN where there is none."""
+    frames, look = span_frames(time, horizon_s), LookAhead(model, horizon_s)
+    places, wrench = np.full((len(time), len(model.marker_names), 3), np.nan), np.full((len(time), 6), np.nan)
+    for k, state in enumerate(states[: len(time) - frames]):
+        if not np.isfinite(state).all():
+            look.interrupted()
+            continue
+        look.look(float(time[k]), np.ascontiguousarray(state))
+        if (expected := look.expected()) is not None:
+            places[k + frames], wrench[k + frames] = expected.values["markers"], expected.values["wrench"]
+    return places, wrench
 
 
 def persisted(signal: Array, frames: int) -> Array:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dynakin.bindings import _core
+from dynakin.filter.live.ahead import Ahead
 from dynakin.filter.step import Labelled, StepEstimate
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.stream.fusion import Fused
@@ -64,6 +65,7 @@ class LiveFrame:
         deviations: of what is published, as `Tracker.deviations`, a few times a second (with a lag once); None in
             between.
         status: how it goes.
+        ahead: what is expected after the sample, of a session that looks ahead; None while the motion is lost.
     """
 
     estimate: StepEstimate
@@ -73,6 +75,7 @@ class LiveFrame:
     state: np.ndarray
     deviations: Mapping[str, Labelled] | None
     status: Status
+    ahead: Ahead | None = None
 
 
 @dataclass(frozen=True, eq=False)
