@@ -18,6 +18,8 @@ OF_JOINTS = get_args(Kind)
 KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "limbs", "clock", "hands", "hips")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
 CENTRES = ("hinge_centre", "elbow_centre", "ball_centre", "spine_centre", "ball_across")
+"""What is farther off at joints that are less sure (`less_sure_joints`)."""
+BY_PLACES = (*CENTRES, "hinge_across")
 """What goes by how far markers have moved, too."""
 
 
@@ -161,7 +163,7 @@ filter whose skin fades learns from a posture that is held, too, and does not kn
 Chosen for one person on one leg for 20 s; two others judge (docs/validation/deviations.md)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
-    hinge_across=0.0,
+    hinge_across=0.002,
     elbow_centre=0.0014,
     ball_centre=0.0016,
     spine_centre=0.0016,
