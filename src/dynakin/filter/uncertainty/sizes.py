@@ -29,8 +29,9 @@ class Sizes:
 
     Attributes:
         hinge_centre: m, of the centre of a joint with one or two axes (knee, ankle).
-        hinge_across: m, by which such a centre may besides lie elsewhere along the joint's axis (to the side): nothing
-            that moves shows it, so that what is estimated of lengths and places takes none of it.
+        hinge_across: m, by which such a centre may besides lie elsewhere along its parent's third axis (to the side),
+            which is nearly the axis of knees and ankles: nothing that moves shows it, so that what is estimated of
+            lengths and places takes none of it.
         elbow_centre: m, of the elbow's: its axis does not pass midway between the epicondyles' markers.
         ball_centre, ball_across: m, of the centre of one with three (hip) along the first two axes of its parent
             (forwards and up), and along the third (to the side).

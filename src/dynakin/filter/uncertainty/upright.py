@@ -44,14 +44,15 @@ def hips_turned(calibrated: CalibratedModel, q: Array) -> dict[str, float]:
     """Thigh -> rad, how far its hip turns about its mean in free coordinates (T, K): root mean square, of all axes
     together. Each leg by itself: of who stands on one and kicks with the other one hip shows nothing of its centre.
     Empty where there are no hips or no frames."""
-    spec, thighs = calibrated.spec, thighs_of(calibrated)
+    spec = calibrated.spec
     place = {name: k for k, name in enumerate(free_names(spec))}
     q = q[np.isfinite(q).all(axis=1)]
     found = {}
-    for segment in spec.segments:
-        turns = {axis.coordinate for axis in segment.axes if axis.kind == "rotation"} & place.keys()
-        if segment.name in thighs and turns and len(q):
-            found[segment.name] = float(np.sqrt(q[:, [place[name] for name in turns]].var(axis=0).sum()))
+    for segment in spec.segments if len(q) else ():
+        turns = {axis.coordinate for axis in segment.axes if axis.kind == "rotation"}
+        own = sorted(place[name] for name in turns & place.keys())
+        if own and segment.name in thighs_of(calibrated):
+            found[segment.name] = float(np.sqrt(q[:, own].var(axis=0).sum()))
     return found
 
 
