@@ -31,7 +31,7 @@ import dynakin
 from dynakin.filter.uncertainty.frames import Frames
 from dynakin.filter.uncertainty.geometry import BLOCKS, Parts
 from dynakin.filter.uncertainty.reported import movement_intensity, reported
-from dynakin.filter.uncertainty.sizes import LANDMARKS, SCALED, Sizes, hips_unshown, usual_sizes
+from dynakin.filter.uncertainty.sizes import LANDMARKS, SCALED, Sizes, usual_sizes
 from dynakin.filter.uncertainty.skin import skin_found
 from dynakin.filter.uncertainty.systematic import Systematic
 from dynakin.filter.uncertainty.upright import hips_turned
@@ -64,7 +64,7 @@ Array = np.ndarray
 class Run:
     """One estimate against the truth: by block errors (T, C), frames with the filter's own deviations, and variances by
     kind of error at size 1. Frames that have no truth or no value are NaN. ``intensity``, ``moved_m``: (T,) as
-    `reported` takes them. ``skin``: as of `skin_found`. ``hips``: as of `hips_unshown`."""
+    `reported` takes them. ``skin``: as of `skin_found`."""
 
     case: str
     seed: int
@@ -76,7 +76,6 @@ class Run:
     moved_m: Array
     parts: Parts
     skin: float
-    hips: float
 
 
 def runs_of(
@@ -157,7 +156,8 @@ def against(
     """Errors, deviations and parts over the window, of the coordinates that both have and that move."""
     data, tracker = tracked.estimate.data, tracked.tracker
     sizes = replace(usual_sizes(tracker.calibrated), inertia=True)  # worked out where it is not in use, too
-    systematic = Systematic(tracker.calibrated, tracker.noise, sizes)
+    turned = hips_turned(tracker.calibrated, values_of(data, "state"))
+    systematic = Systematic(tracker.calibrated, tracker.noise, sizes).with_found(0.0, hips_turned=turned)
     late = bool(tracked.estimate.config["lag_s"])
     frames = Frames.of(data, len(tracker.calibrated.feet), tracker.noise.variance_scale, late=late)
     parts, free = systematic.parts(frames), systematic.geometry.free
@@ -191,7 +191,6 @@ def against(
         systematic.moved_m(frames.states)[window],
         {kind: {block: part[block][here] for block in blocks} for kind, part in parts.items()},
         skin_found(tracker.calibrated, {name: data[name].values for name in ("state", "tracking")}),
-        hips_unshown(hips_turned(tracker.calibrated, values_of(data, "state"))),
     )
 
 
@@ -218,7 +217,7 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     found = {}
     said = run.frames.sd
     if sizes is not None:
-        sizes = replace(sizes, hips=run.hips).with_skin(run.skin)
+        sizes = sizes.with_skin(run.skin)
         said = reported(run.frames, sizes, run.parts, run.intensity, run.moved_m)
     for title, block, places in groups_of(run):
         e, sd = run.error[block][:, places], said[block][:, places]
@@ -265,7 +264,7 @@ def tell(runs: Sequence[Run], sizes: dict[str, Sizes]) -> None:
 
 def choose(runs: Sequence[Run], kind: str, start: dict[str, Sizes]) -> Sizes:
     """Sizes of one kind of model for which groups lie nearest to 94 % and 1.3, and none is far off."""
-    fixed = ("placed", "inertia", "skin_found")  # beyond `placed` only its ratio to the centres' sizes counts
+    fixed = ("placed", "inertia", "skin_found", "hips")  # beyond `placed` only its ratio to the centres' sizes counts
     names = [name for name, value in asdict(start[kind]).items() if value and name not in fixed]
     first = np.log([getattr(start[kind], name) for name in names])
     mine = [run for run in runs if run.sizes == kind]

@@ -33,6 +33,7 @@ RATE = np.array([-900.0, 4000.0, 300.0, 200.0, 100.0, 700.0])
 """By how much the contact changes, N and N m a second."""
 SIZES = (
     0.01,
+    0.013,
     0.011,
     0.02,
     0.025,

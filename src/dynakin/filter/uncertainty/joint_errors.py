@@ -22,6 +22,7 @@ from dynakin.model.spec import free_coordinates, free_names
 
 Kind = Literal[
     "hinge_centre",
+    "hinge_across",
     "elbow_centre",
     "ball_centre",
     "spine_centre",
@@ -35,9 +36,10 @@ Kind = Literal[
     "root_origin",
 ]
 """The centre of a joint with one or two axes (hinge; elbow: what hangs on a limb of the trunk) off where it is on its
-bones, or with three (ball; the spine's) within its parent's sagittal plane and across that; its one axis, two or three
-turned on both bones, or those of what hangs on the trunk and bears another joint; the root's frame turned in its bone,
-about its third axis (tilt, the trunk's as well) or another, or its origin elsewhere in it."""
+bones, and besides across its parent's sagittal plane (hinges of limbs); or with three (ball; the spine's) within that
+plane and across it; its one axis, two or three turned on both bones, or those of what hangs on the trunk and bears
+another joint; the root's frame turned in its bone, about its third axis (tilt, the trunk's as well) or another, or its
+origin elsewhere in it."""
 BALLS: tuple[Kind, ...] = ("ball_centre", "ball_across")
 """Centres of joints with three axes that are not the spine's."""
 OF_FRAMES: tuple[Kind, ...] = ("root_frame", "frame_tilt", "root_origin")
@@ -222,12 +224,13 @@ def _sources(
         axes = min(len(joints[name] | own & held), 3)
         directions = orientations[segment.parent].T if axes == 3 else _AXES
         for k, e in enumerate(directions[: 2 if planar else 3]):
-            column = _along(name, "moved", R_J, e)
-            for child in children:
-                column |= _along(child.name, "moved", R_B @ child.rotation, -e)
+            column = _moved(name, R_J, children, R_B, e)
             hinge: Kind = "elbow_centre" if segment.parent in arms else "hinge_centre"
             found.append((hinge if axes < 3 else _centre(k, name in trunks), name, column))
         if not planar:
+            if axes < 3 and segment.parent not in arms:
+                side = orientations[segment.parent].T[2]
+                found.append(("hinge_across", name, _moved(name, R_J, children, R_B, side)))
             if name in trunks:
                 found.append(("frame_tilt", name, _frame_turned(name, R_B, jointed, R_B.T[2])))
             both = [_along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e) for e in _AXES]
@@ -240,6 +243,14 @@ def _centre(direction: int, spine: bool) -> Kind:
     if direction == 2:
         return "ball_across"
     return "spine_centre" if spine else "ball_centre"
+
+
+def _moved(name: str, R_J: Array, children: Sequence[_core.SegmentSpec], R_B: Array, e: Array) -> Column:
+    """A joint moved by e: its segment goes with it, and what hangs on that stays where it is on the bones."""
+    column = _along(name, "moved", R_J, e)
+    for child in children:
+        column |= _along(child.name, "moved", R_B @ child.rotation, -e)
+    return column
 
 
 def _frame_turned(name: str, R_B: Array, children: Sequence[_core.SegmentSpec], e: Array) -> Column:

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from copy import copy
+
 import numpy as np
 
 from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.frames import Frame, differences
 from dynakin.filter.uncertainty.geometry import Geometry, Parts
-from dynakin.filter.uncertainty.sizes import CENTRES, OF_JOINTS, less_sure_joints
+from dynakin.filter.uncertainty.sizes import OF_JOINTS, hips_unshown, less_sure
 from dynakin.filter.uncertainty.upright import rolling_more, rolls
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.settings.noise import Noise
 
 
 class Joints:
     """Kinds `OF_JOINTS`, "roll" (how far a joint's centre moves with the square of its angle), and "hips" (what the
-    priors leave open of their centres)."""
+    priors leave open of their centres and a recording does not show: nothing until `with_hips`)."""
 
-    def __init__(self, geometry: Geometry, calibrated: CalibratedModel, noise: Noise) -> None:
+    def __init__(self, geometry: Geometry, calibrated: CalibratedModel) -> None:
         self._geometry, errors = geometry, geometry.errors
         first = {name: k for k, name in enumerate(calibrated.names)}
         self._rolls = [first[name] for name in rolls(calibrated.spec) if name in first]
@@ -27,11 +29,21 @@ class Joints:
         self._B0 = gain @ np.hstack([N, self._rolled(geometry.reference)])
         kinds = np.array([*errors.kinds, *("roll" for _ in self._rolls)])
         self._columns = {kind: np.flatnonzero(kinds == kind) for kind in (*OF_JOINTS, "roll")}
-        unsure, of_rolls = less_sure_joints(calibrated), len(self._rolls)
-        sources = zip(errors.kinds, errors.joints, strict=True)
-        times = [unsure.get(joint, 1.0) if kind in CENTRES else 1.0 for kind, joint in sources]
-        self._times = np.append(times, np.ones(of_rolls))
-        self._hips_open_m = noise.systematic_scale * np.append(errors.hips_open_m(calibrated), np.zeros(of_rolls))
+        none = np.zeros(len(self._rolls))
+        self._times = np.append(less_sure(calibrated, errors.kinds, errors.joints), none + 1.0)
+        self._hips_open_m = np.append(errors.hips_open_m(calibrated), none)
+        self._hips_unshown_m = np.zeros(len(kinds))
+
+    def with_hips(self, turned: Mapping[str, float]) -> Joints:
+        """The same in a recording in which hips turn so far, of what the priors leave open of their centres.
+
+        Args:
+            turned: as of `hips_turned`.
+        """
+        other, joints = copy(self), self._geometry.errors.joints
+        unshown = [hips_unshown(turned[joint]) if joint in turned else 0.0 for joint in joints]
+        other._hips_unshown_m = self._hips_open_m * np.append(unshown, np.zeros(len(self._rolls)))
+        return other
 
     def variances(self, frame: Frame) -> Parts:
         """By kind of error, in one frame."""
@@ -46,7 +58,7 @@ class Joints:
         found = {}
         for kind, chosen in self._columns.items():
             found[kind] = self._geometry.blocks(*(values[:, chosen] @ self._times[chosen] ** 2 for values in squares))
-        found["hips"] = self._geometry.blocks(*(values @ self._hips_open_m**2 for values in squares))
+        found["hips"] = self._geometry.blocks(*(values @ self._hips_unshown_m**2 for values in squares))
         return found
 
     def _rolled(self, q: Array) -> Array:

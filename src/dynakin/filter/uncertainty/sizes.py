@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.filter.uncertainty.joint_errors import Kind
 from dynakin.model.calibration.calibrated import CalibratedModel, Hips
 from dynakin.model.mirroring import SUFFIXES
@@ -16,6 +18,8 @@ OF_JOINTS = get_args(Kind)
 KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "limbs", "clock", "hands", "hips")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
 CENTRES = ("hinge_centre", "elbow_centre", "ball_centre", "spine_centre", "ball_across")
+"""What is farther off at joints that are less sure (`less_sure_joints`)."""
+BY_PLACES = (*CENTRES, "hinge_across")
 """What goes by how far markers have moved, too."""
 
 
@@ -25,6 +29,9 @@ class Sizes:
 
     Attributes:
         hinge_centre: m, of the centre of a joint with one or two axes (knee, ankle).
+        hinge_across: m, by which such a centre may besides lie elsewhere along its parent's third axis (to the side),
+            which is nearly the axis of knees and ankles: nothing that moves shows it, so that what is estimated of
+            lengths and places takes none of it.
         elbow_centre: m, of the elbow's: its axis does not pass midway between the epicondyles' markers.
         ball_centre, ball_across: m, of the centre of one with three (hip) along the first two axes of its parent
             (forwards and up), and along the third (to the side).
@@ -56,10 +63,12 @@ class Sizes:
         inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
             `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
         hands: kg, of what both hands may hold together that the model does not have (`Ground.in_hands_kg`).
-        hips: part of what the priors leave open of hips' centres that this recording does not show (`hips_unshown`).
+        hips: part that counts of what the priors leave open of hips' centres and a recording does not show
+            (`hips_unshown`): all of it.
     """
 
     hinge_centre: float
+    hinge_across: float
     elbow_centre: float
     ball_centre: float
     spine_centre: float
@@ -84,7 +93,7 @@ class Sizes:
     own_off_plates: float
     inertia: bool = True
     hands: float = 0.0
-    hips: float = 0.0
+    hips: float = 1.0
 
     def scaled(self, factor: float) -> Sizes:
         """The errors of joints, skin, centres of mass, limbs and clock times a factor."""
@@ -97,6 +106,7 @@ class Sizes:
 
 LANDMARKS = Sizes(
     hinge_centre=0.0015,
+    hinge_across=0.0028,
     elbow_centre=0.007,
     ball_centre=0.0015,
     spine_centre=0.03,
@@ -140,15 +150,21 @@ OF_HIPS: dict[Hips, dict[str, float]] = {
 """Times as far off as others are the centres at which these hang, by where hips come from. Of `truth3d`'s squats 21 and
 walks 22 with markers of the pelvis left out; where proportions have the hips, lengths of the legs and the joints below
 are off with them. Judged on walk 4, squat 22, and a walk with one common marker (`docs/validation/geometry.md`)."""
+LAID: dict[Kind, float] = {"hinge_axes": 2.5, "pair_axes": 2.5, "elbow_centre": 2.0}
+"""Times as far off as others are the axes, and an elbow's centre, of joints whose axes are not marked
+(`Provenance.laid_axes`). By truth the axis of elbows with one epicondyle marked is 10 to 20 deg off (1 to 9 with both),
+its centre 17 to 28 mm (8 to 18), ankles' of feet without a heel 16 to 26 deg (5 to 8). Chosen on simulated walks 1 to 3
+and squats 1 to 4, judged on others (docs/validation/deviations.md)."""
 SINCE_CENTRE = 0.5
 """How far off the centre of a joint may be by skin of its two segments that never comes back to where the standing
 trial has it, of that skin's way (`Site.since_m`)."""
 SHOWS_HIPS_RAD = np.radians(2.0)
-"""How far hips turn (`hips_turned`) where half of the variance is left that regressions leave of their centres: a
+"""How far a hip turns (`hips_turned`) where half of the variance is left that regressions leave of its centre: a
 filter whose skin fades learns from a posture that is held, too, and does not know that skin stays displaced there.
 Chosen for one person on one leg for 20 s; two others judge (docs/validation/deviations.md)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
+    hinge_across=0.002,
     elbow_centre=0.0014,
     ball_centre=0.0016,
     spine_centre=0.0016,
@@ -189,8 +205,19 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
 
 
 def hips_unshown(turned_rad: float) -> float:
-    """Part of what regressions leave open of hips' centres that stays so where hips turn so far (`hips_turned`)."""
+    """Part of what regressions leave open of a hip's centre that stays so where it turns so far (`hips_turned`)."""
     return float(1.0 / np.hypot(1.0, turned_rad / SHOWS_HIPS_RAD))
+
+
+def less_sure(calibrated: CalibratedModel, kinds: Sequence[Kind], joints: Sequence[str]) -> Array:
+    """(S,) how many times as far off as others each source of a joint's error may be, of these kinds at the joints of
+    these segments."""
+    centres, laid = less_sure_joints(calibrated), {*calibrated.provenance.laid_axes}
+    found = [
+        max(centres.get(joint, 1.0) if kind in CENTRES else 1.0, LAID.get(kind, 1.0) if joint in laid else 1.0)
+        for kind, joint in zip(kinds, joints, strict=True)
+    ]
+    return np.array(found)
 
 
 def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:

@@ -7,8 +7,10 @@ afterwards and added to the filter's own variances ([derivations](derivations.md
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -20,7 +22,7 @@ from dynakin.filter.uncertainty.joints import Joints
 from dynakin.filter.uncertainty.loads import Clock, Hands, late_by
 from dynakin.filter.uncertainty.mass_centres import Inertia, MassCentres
 from dynakin.filter.uncertainty.reported import movement_intensity, reported
-from dynakin.filter.uncertainty.sizes import KINDS, Sizes, hips_unshown, usual_sizes
+from dynakin.filter.uncertainty.sizes import KINDS, Sizes, usual_sizes
 from dynakin.filter.uncertainty.skin import Skin
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -58,9 +60,9 @@ class Systematic:
         spec = calibrated.spec
         self.sizes = sizes or usual_sizes(calibrated).scaled(noise.systematic_scale)
         self.geometry = Geometry(calibrated, noise)
-        self._clock = Clock(self.geometry)
+        self._clock, self._joints = Clock(self.geometry), Joints(self.geometry, calibrated)
         self._errors: list[Error] = [
-            Joints(self.geometry, calibrated, noise),
+            self._joints,
             Skin(self.geometry, calibrated),
             MassCentres(self.geometry, calibrated),
             Hands(self.geometry),
@@ -76,14 +78,20 @@ class Systematic:
         self._place0 = calibrated.x0[self._places]
 
     def with_found(
-        self, clock_sd_s: float, in_hands_kg: float = 0.0, skin: float = 0.0, hips_turned: float = np.inf
+        self,
+        clock_sd_s: float,
+        in_hands_kg: float = 0.0,
+        skin: float = 0.0,
+        hips_turned: Mapping[str, float] = MappingProxyType({}),
     ) -> Systematic:
         """The same, where the plates' clock is less sure than in a walk whose segments are all marked, hands may hold
-        what the model does not have, more of skin's displacement was found than usual, or hips turn (rad) so little
-        that their centres stay where standing markers have them."""
+        what the model does not have, more of skin's displacement was found than usual, or hips turn (`hips_turned`,
+        rad) so little that their centres stay where standing markers have them."""
         sizes, other = self.sizes, copy(self)
-        clock, hips = max(clock_sd_s, sizes.clock), hips_unshown(hips_turned)
-        other.sizes = replace(sizes, clock=clock, hands=in_hands_kg, hips=hips).with_skin(skin)
+        other.sizes = replace(sizes, clock=max(clock_sd_s, sizes.clock), hands=in_hands_kg).with_skin(skin)
+        other._errors = [each for each in self._errors if each is not self._joints]
+        other._joints = self._joints.with_hips(hips_turned)
+        other._errors.append(other._joints)
         return other
 
     def parts_at(self, frame: Frame) -> Parts:

@@ -40,16 +40,20 @@ def _on_root(calibrated: CalibratedModel) -> set[str]:
     return {segment.name for segment in calibrated.spec.segments if segment.parent in roots}
 
 
-def hips_turned(calibrated: CalibratedModel, q: Array) -> float:
-    """rad, how far hips turn about their means in free coordinates (T, K): root mean square of the legs, of all axes
-    together; infinite where there are no hips or no frames."""
-    spec, thighs = calibrated.spec, thighs_of(calibrated)
+def hips_turned(calibrated: CalibratedModel, q: Array) -> dict[str, float]:
+    """Thigh -> rad, how far its hip turns about its mean in free coordinates (T, K): root mean square, of all axes
+    together. Each leg by itself: of who stands on one and kicks with the other one hip shows nothing of its centre.
+    Empty where there are no hips or no frames."""
+    spec = calibrated.spec
     place = {name: k for k, name in enumerate(free_names(spec))}
-    legs = [{place[axis.coordinate] for axis in segment.axes if axis.kind == "rotation" and axis.coordinate in place}
-            for segment in spec.segments if segment.name in thighs]  # fmt: skip
-    own, turning = sorted(set().union(*legs)), sum(map(bool, legs))
     q = q[np.isfinite(q).all(axis=1)]
-    return float(np.sqrt(q[:, own].var(axis=0).sum() / turning)) if own and len(q) else np.inf
+    found = {}
+    for segment in spec.segments if len(q) else ():
+        turns = {axis.coordinate for axis in segment.axes if axis.kind == "rotation"}
+        own = sorted(place[name] for name in turns & place.keys())
+        if own and segment.name in thighs_of(calibrated):
+            found[segment.name] = float(np.sqrt(q[:, own].var(axis=0).sum()))
+    return found
 
 
 def neutral(calibrated: CalibratedModel) -> Array:

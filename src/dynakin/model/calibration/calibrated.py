@@ -85,6 +85,8 @@ class Provenance:
         one_sided_joints: knees and ankles with a lateral marker alone and no measured width: their centres lie half an
             adult's joint width inwards.
         moved_joints: knees and ankles whose markers sit otherwise in the standing trial than in the trial.
+        laid_axes: segments at whose joints the axes are not marked: forearms whose elbow has one epicondyle marked (its
+            axis is square to the arm as it is bent), feet without a heel or toe (proportions have the foot's line).
         hips: where their centres come from: markers of the pelvis; functional trials; supposed, where some of these
             markers are put where two others or the other side have them, or sit otherwise in the trial; or proportions
             of an adult.
@@ -94,6 +96,7 @@ class Provenance:
     unmarked_joints: tuple[str, ...] = ()
     one_sided_joints: tuple[str, ...] = ()
     moved_joints: tuple[str, ...] = ()
+    laid_axes: tuple[str, ...] = ()
     hips: Hips = "measured"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,14 +40,14 @@ from dynakin.model.calibration.legs_in_motion import (
 )
 from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
 from dynakin.model.calibration.moved_markers import Moved, moved_markers
-from dynakin.model.calibration.posture import Posture, find_geometry, find_posture
+from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.calibration.unseen_pelvis import Pelvis, hips_of_proportions
 from dynakin.model.markers.fit import refuse_unfit
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.recognise import recognise, recognise_standing
 from dynakin.model.markers.schema import MarkerSetFile
-from dynakin.model.mirroring import SIDES
+from dynakin.model.mirroring import SIDES, SUFFIXES
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
@@ -217,10 +217,27 @@ def measure(asked: Asked) -> tuple[ModelPlan, Measured]:
             unmarked_joints=unmarked,
             one_sided_joints=tuple(n for n in LEG_JOINTS if n in finder.usual_widths - {*(asked.functional or ())}),
             moved_joints=trials.moved.joints(finder),
+            laid_axes=_laid_axes(model, still.source.match, found.added) if model.sided else (),
             hips=trials.pelvis.hips(finder, found.added, asked.functional or (), trials.moved.hips(finder)),
         ),
         still=still.stands,
     )
+
+
+def _laid_axes(model: ModelFile, match: MarkerMatch, added: Collection[str]) -> tuple[str, ...]:
+    """As of `Provenance.laid_axes`.
+
+    Args:
+        match: of the trial in which joints are measured. added: landmarks that no markers give.
+    """
+    found = []
+    for segment in model.segments:
+        side, suffix = segment.side or "", SUFFIXES.get(segment.side or "", "")
+        epicondyles = ("ELB", side) in match.names and any((name, side) in match.names for name in ("ELM", "EJC"))
+        line = {f"heel{suffix}", f"toe{suffix}"} & {*frame_landmarks(segment)}
+        if (segment.origin == f"elbow{suffix}" and not epicondyles) or line & {*added}:
+            found.append(segment.name)
+    return tuple(found)
 
 
 def _matched(asked: Asked, messages: list[Message]) -> _Trials:
