@@ -12,8 +12,9 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONDONTWRITEBYTECODE  # tests start many processes; each would compile all modules again
 # pip compiles there, and the C++ tests link the same core.
 export SKBUILD_BUILD_DIR := build/package
-# A file's tests stay in one process, so that what they share is made once.
-PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile --durations 20 --durations-min 5
+# Neighbours run in one process, so that what they share is made once; who is done takes half of what another has left.
+# A process a core: a second thread in each would only wait on the others' cores (docs/design.md).
+PYTEST := OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist worksteal --durations 20 --durations-min 5
 
 .PHONY: all demo live check test test-python test-cpp test-cpp-install test-cpp-sanitize test-cpp-address test-cpp-thread lint stubs bench peers nightly clean prerequisites
 all: $(VENV)/.built

@@ -22,7 +22,7 @@ from dynakin.results.records import REFUSED
 from dynakin.settings.noise import Noise
 from dynakin.settings.subject import Subject
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import simulate
+from support.simulated import simulate
 
 SUBJECT = Subject(mass_kg=70.0, height_m=1.75, sex="male")
 

@@ -26,7 +26,7 @@ from dynakin.results.measures.feet import contact_figures, foot_sources
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from dynakin.settings.settings import Settings, read_keys
 from dynakin.simulation.output import SimulatedTrial
-from dynakin.simulation.trial import simulate
+from support.simulated import simulate
 
 WEIGHT = 70.0 * 9.80665
 LEGS = ("hip_flexion_r", "knee_angle_r", "ankle_angle_r", "hip_flexion_l", "knee_angle_l", "ankle_angle_l")

@@ -22,7 +22,7 @@ from dynakin.recordings.feet.loads import MEASURED, UNKNOWN, FootLoads
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
-from dynakin.simulation.trial import simulate
+from support.simulated import simulate
 
 HANDS = ("hand_right", "hand_left")
 

@@ -18,7 +18,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import simulate_squat
+from support.simulated import simulate_squat
 from support.squat_estimator import estimator, samples, with_markers
 
 START_S = 3.0

@@ -18,7 +18,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import angle_columns, convention_of, with_angles
 from dynakin.results.measures.mean_curves import estimate_curves
 from dynakin.results.measures.metrics import compute_metrics
-from dynakin.simulation.trial import simulate
+from support.simulated import simulate
 
 WHO = dynakin.Subject(mass_kg=72.6, height_m=1.8, sex="male")
 

@@ -17,6 +17,8 @@ from support.gaps import GAPS_S, LATER_S, compared, distance, estimator, figures
 from support.gaps import Followed as Run
 
 STOP_S, AFTER_S = 6.0, 2.0
+START_S = {"sagittal7": 0.0, "fullbody": 4.0}
+"""From when on the person is followed, who then stands, and squats before the gap."""
 LENGTH_S = STOP_S + LATER_S + AFTER_S
 FIT_M = 0.03  # what the core calls a fit
 
@@ -28,7 +30,7 @@ EACH_NIGHT = [pytest.param("fullbody", gap_s, marks=pytest.mark.nightly) for gap
 @pytest.mark.parametrize(("kind", "gap_s"), [*CASES, *EACH_NIGHT])
 def test_soon_after_a_gap_all_is_as_it_was_and_no_frame_claims_too_much(kind: str, gap_s: float) -> None:
     """0.1 has 1 to 600,000 m of error after 2 to 300 s, and says "following" 5 cm off for hundreds of frames."""
-    found = figures(kind, gap_s, STOP_S, AFTER_S)
+    found = figures(kind, gap_s, STOP_S, AFTER_S, START_S[kind])
     assert found.words[0] == "found" and set(found.words[1:]) == {"following"}
     assert found.soon < 1.5 and found.later < 1.5
     assert found.following_m < 0.005
@@ -49,7 +51,7 @@ def test_a_live_session_says_that_the_motion_is_found_again(kind: str, gap_s: fl
     assert initial is not None and len(time) > 400
     off = [distance(initial, frame.estimate.markers, dict(frame.fused.sample.markers)) for frame in frames]
     run = Run(np.array(off), np.array([frame.status.tracking for frame in frames]))
-    whole = np.interp(time, person(kind, LENGTH_S).time, without_gap(kind, LENGTH_S).off)
+    whole = np.interp(time, person(kind, LENGTH_S).time, without_gap(kind, LENGTH_S, 0.0).off)
     found = compared(run, Run(np.full(len(time), whole[time < STOP_S][200:].mean()), run.tracking), time, STOP_S)
     assert found.words[0] == "found" and set(found.words[1:]) == {"following"}
     assert found.following_m < 0.005 and found.later < 2.0
@@ -71,7 +73,7 @@ def test_a_jump_of_the_posture_within_the_carried_time_leaves_no_segment_behind(
     """0.1 s, and 2.4 s of movement: 0.1 refused the trunk's markers for seconds, and said that it follows."""
     recording, _ = with_gap(person("fullbody", LENGTH_S), STOP_S, LATER_S)
     time = recording.time - np.where(recording.time < STOP_S - 1e-6, 0.0, LATER_S - 0.1)
-    run = follow("fullbody", dataclasses.replace(recording, time=time))
+    run = follow("fullbody", dataclasses.replace(recording, time=time), START_S["fullbody"])
     following = run.off[run.tracking == "following"]
     assert following.max() < FIT_M and run.off[-150:].max() < 0.002
 
@@ -86,8 +88,8 @@ def test_a_person_who_comes_back_facing_elsewhere_is_found(turn_deg: float) -> N
     centre = np.nanmean(markers[after][0], axis=0)
     markers[after] = (markers[after] - centre) @ R.T + centre + 2.0 * (np.eye(3)[0] - up * up[0])
     turned = dataclasses.replace(recording, markers=markers, plates=())
-    run = follow("fullbody", turned)
-    first = int(np.flatnonzero(after)[0])
+    run = follow("fullbody", turned, START_S["fullbody"])
+    first = len(run.off) - int(after.sum())
     assert run.tracking[first] == "found" and set(run.tracking[first + 1 :]) == {"following"}
     assert run.off[first:].max() < 0.005
 

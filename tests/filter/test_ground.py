@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -41,14 +40,11 @@ from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, out_of_sight, taken_back, wrench_sources
 from dynakin.settings.settings import Settings
-from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 from support.estimates.walking import make_walker
+from support.simulated import simulate
 
 WEIGHT = 70.0 * GRAVITY_M_S2
-
-
-simulate = cache(simulate_anew)  # several tests start from the same walk or squat
 
 
 def person(model: str) -> Estimator:

@@ -26,7 +26,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, legs_of
 from dynakin.results.records import REFUSED
 from dynakin.settings import presets
-from dynakin.simulation.trial import simulate
+from support.simulated import simulate
 
 
 def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> None:

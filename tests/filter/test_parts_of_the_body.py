@@ -26,7 +26,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import ABSENT, MEASURED, moment_sources
 from dynakin.settings.subject import Subject
 from dynakin.simulation.output import SimulatedTrial
-from dynakin.simulation.trial import simulate
+from support.simulated import simulate
 
 UPPER = ("Sternum", "C7", "Shoulder", "humerus", "elbow", "forearm", "wrist")
 LEG = ("thigh", "knee", "sh2", "sh3", "shank", "ankle", "calc", "toe", "meta")

@@ -16,7 +16,7 @@ from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import marker_paths, total_wrench
 from dynakin.messages import about
 from dynakin.recordings.recording import Recording
-from support.plates import person, prepared, trial
+from support.plates import estimated, person, prepared, trial
 
 
 def delay_of(recording: Recording, ready: Prepared) -> Delay | None:
@@ -64,9 +64,8 @@ def test_frames_that_show_too_little_are_left_out_and_the_rest_is_asked() -> Non
 
 def test_a_run_brings_plates_into_step_and_says_so_where_it_is_not_by_chance() -> None:
     """A frame late: moments are those of plates in step."""
-    whole = trial("gait")
-    late = brought_into_step(whole, Delay(-0.01, 0.0))
-    right, found = (person().run(recording) for recording in (whole, late))
+    late = brought_into_step(trial("gait"), Delay(-0.01, 0.0))
+    right, found = estimated("gait"), person().run(late)
     assert found.config["ground"]["plates_behind_s"] == pytest.approx(0.01, abs=0.002)
     assert right.config["ground"]["plates_behind_s"] == 0.0
     assert about(found.messages, "in step") and not about(right.messages, "in step")

@@ -21,8 +21,8 @@ from dynakin.filter.prepared import Prepared
 from dynakin.messages import about, warnings_of
 from dynakin.recordings.feet.loads import MEASURED, UNKNOWN
 from dynakin.recordings.recording import Plate
-from dynakin.simulation.trial import simulate
 from support.plates import person, prepared, scaled, trial, with_plate
+from support.simulated import simulate
 
 
 def said_of_gains(ready: Prepared) -> list[str]:

@@ -15,7 +15,7 @@ from dynakin.model.definition import load_model
 from dynakin.results.records import FOLLOWING
 from dynakin.settings.noise import Noise
 from dynakin.settings.subject import Subject
-from dynakin.simulation.trial import simulate
+from support.simulated import simulate
 
 Array = np.ndarray
 FRAMES = 3000

@@ -16,6 +16,7 @@ import pytest
 from dynakin.errors import ModelError, RecordingError
 from dynakin.messages import Message
 from dynakin.model.definition import load_model
+from dynakin.model.markers.draft import draft
 from dynakin.model.markers.fit import choose_marker_set
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import MarkerMatch, match_markers
@@ -262,6 +263,20 @@ def test_names_that_only_the_standing_trial_has_are_known_by_what_they_say() -> 
     asked = recognise(trial, load_marker_set("gait2354"))
     unknown = recognise_standing(static, trial, asked).match.unexplained
     assert set(own.values()) <= set(unknown)
+
+
+def test_where_markers_lie_is_asked_only_where_a_name_may_be_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That takes as long as all else of a recognition, and nothing that follows a forearm is ever used."""
+    plain = recognised("opencap").match
+    assert set(plain.unexplained) == {"R_forearm", "L_forearm"}
+
+    def asked(recording: Recording) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(draft, "guess_markers", asked)
+    assert recognise(replace(walking("opencap"))).match.names == plain.names
+    with pytest.raises(AssertionError):
+        recognise(renamed(walking("opencap"), lambda name: name.replace("forearm", "thigh9")))
 
 
 def test_names_of_joint_centres_beside_a_marked_pelvis_are_on_the_skin() -> None:

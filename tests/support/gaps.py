@@ -55,11 +55,13 @@ def distance(initial: CalibratedModel, estimated: np.ndarray, measured: dict[str
     return float(np.sqrt(np.mean((np.where(axes, estimated - places, 0.0) ** 2).sum(axis=1))))
 
 
-def follow(kind: str, recording: Recording) -> Followed:
-    """By `Tracker.step`, from a model measured on the first two seconds."""
+def follow(kind: str, recording: Recording, start_s: float = 0.0) -> Followed:
+    """By `Tracker.step` from ``start_s`` on, from a model measured on the first two seconds."""
     live = estimator(kind).start(recording.window(0.0, 2.0))
     off, tracking = [], []
     for k, t in enumerate(recording.time):
+        if t < start_s - 1e-6:
+            continue
         markers = dict(zip(recording.marker_names, recording.markers[k], strict=True))
         plates = {p.name: np.hstack([p.force[k], p.moment[k]]) for p in recording.plates}
         step = live.step(dynakin.Sample(float(t), markers, plates))
@@ -69,8 +71,8 @@ def follow(kind: str, recording: Recording) -> Followed:
 
 
 @cache
-def without_gap(kind: str, length_s: float) -> Followed:
-    return follow(kind, person(kind, length_s))
+def without_gap(kind: str, length_s: float, start_s: float) -> Followed:
+    return follow(kind, person(kind, length_s), start_s)
 
 
 @dataclass
@@ -84,11 +86,13 @@ class Figures:
     rms_m: float
 
 
-def figures(kind: str, gap_s: float, stop_s: float, after_s: float) -> Figures:
+def figures(kind: str, gap_s: float, stop_s: float, after_s: float, start_s: float = 0.0) -> Figures:
     length_s = stop_s + LATER_S + after_s
     gapped, kept = with_gap(person(kind, length_s), stop_s, gap_s)
-    found, whole = follow(kind, gapped), without_gap(kind, length_s)
-    return compared(found, Followed(whole.off[kept], whole.tracking[kept]), gapped.time, stop_s)
+    found, whole = follow(kind, gapped, start_s), without_gap(kind, length_s, start_s)
+    skipped = len(kept) - len(found.off)
+    kept = kept[skipped:] - skipped
+    return compared(found, Followed(whole.off[kept], whole.tracking[kept]), gapped.time[skipped:], stop_s)
 
 
 def compared(found: Followed, whole: Followed, time: np.ndarray, stop_s: float) -> Figures:

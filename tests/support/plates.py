@@ -8,11 +8,11 @@ from functools import cache
 
 import numpy as np
 
-from dynakin import Estimator, Subject, load_model
+from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.arrays import Array
 from dynakin.filter.prepared import Prepared
 from dynakin.recordings.recording import Plate, Recording
-from dynakin.simulation.trial import simulate
+from support.simulated import simulate
 
 LENGTH_S = {"gait": 4.0, "squat": 8.0}
 
@@ -30,6 +30,12 @@ def trial(motion: str) -> Recording:
 def prepared(motion: str, *contacts: str, mass_kg: float = 70.0) -> Prepared:
     """The trial as it is, prepared: nothing that follows it changes it."""
     return person(*contacts, mass_kg=mass_kg).prepare(trial(motion))
+
+
+@cache
+def estimated(motion: str) -> Estimate:
+    """The trial as it is, estimated."""
+    return person().follow(prepared(motion)).estimate
 
 
 def with_plate(recording: Recording, which: int | None, change: Callable[[Plate], Plate]) -> Recording:

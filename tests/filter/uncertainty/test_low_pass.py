@@ -14,7 +14,7 @@ from dynakin.recordings.resampling import low_pass
 from dynakin.report.findings.said import warned
 from dynakin.results.estimate import Estimate
 from dynakin.settings.subject import Subject
-from dynakin.simulation.trial import simulate
+from support.simulated import simulate
 
 LEGS = ("hip_flexion", "knee_angle", "ankle_angle")
 

@@ -277,15 +277,18 @@ def _swaps_for_a_while(
             # An exchange makes no new lengths, only of others; it changes nothing for who is on neither's segment.
             order = np.arange(len(keys))
             order[[i, j]] = j, i
+            where, both = np.flatnonzero(either), np.array([i, j])
+            mended = either.copy()  # of most pairs nothing is: the others of their segments need not be asked
+            left = _off(lengths[np.ix_(where, order[both])][:, :, order], usual[both], expected.rigid[both])
+            mended[where] = left.max(axis=1) < _MENDED * off[np.ix_(where, both)].max(axis=1)
+            if 2 * mended.sum() < either.sum():
+                continue
             concerned = np.array(sorted({i, j} | partners[i] | partners[j]))
-            changed = lengths[either][:, order[concerned]][:, :, order]
             after = off.copy()
-            after[np.flatnonzero(either)[:, None], concerned] = _off(
-                changed, usual[concerned], expected.rigid[concerned]
-            )
-            mended = either & (after[:, [i, j]].max(axis=1) < _MENDED * off[:, [i, j]].max(axis=1))
+            changed = lengths[np.ix_(where, order[concerned])][:, :, order]
+            after[np.ix_(where, concerned)] = _off(changed, usual[concerned], expected.rigid[concerned])
             gain = float(whole - after.sum())
-            if 2 * mended.sum() >= either.sum() and gain > 0.0:
+            if gain > 0.0:
                 other = places.copy()
                 other[either, i], other[either, j] = places[either, j], places[either, i]
                 shorter = _way(places[:, [i, j]]) - _way(other[:, [i, j]])

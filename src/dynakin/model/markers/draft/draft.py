@@ -26,7 +26,7 @@ from dynakin.model.markers.draft.by_geometry import (
     mirrored_node,
     segment_at,
 )
-from dynakin.model.markers.draft.by_name import Sure, places, said_together
+from dynakin.model.markers.draft.by_name import Said, Sure, places, said_together
 from dynakin.model.markers.draft.guess import Guess, contents, is_text, names_in_set, printable, rest_of
 from dynakin.model.markers.match import MarkerMatch, is_unlabelled
 from dynakin.recordings.frame import UPRIGHT
@@ -111,13 +111,13 @@ def drafted(recording: Recording) -> dict[str, Any] | None:
 def further(recording: Recording, match: MarkerMatch) -> list[Guess]:
     """Guesses at names that a match does not know, as far as the name says them, the body agrees, and the place is free
     and no other name's."""
-    if not match.unexplained:
-        return []
+    left, taken = set(match.unexplained), {*match.names, *match.left_out}
+    if not left or not any(_may_be_used(own) for name, own in _spoken(recording).items() if name in left):
+        return []  # before all is guessed: where markers lie takes long
     try:
         guesses = guess_markers(recording)
     except RecordingError:
         return []  # names that differ by case alone: which is which nobody knows
-    left, taken = set(match.unexplained), {*match.names, *match.left_out}
     spoken = said_together(guess.recorded for guess in guesses)
     claims = Counter((own.place, own.side) for name, own in spoken.items() if name in left)
     sided = {marker.name: not marker.centre for marker in match.marker_set.markers}
@@ -134,6 +134,15 @@ def further(recording: Recording, match: MarkerMatch) -> list[Guess]:
         if fits:
             found.append(guess)
     return found
+
+
+def _spoken(recording: Recording) -> dict[str, Said]:
+    return said_together(_standing(recording)[0])
+
+
+def _may_be_used(own: Said) -> bool:
+    """Whether `further` may use a marker whose name says this; a head's may get a place by where they lie."""
+    return own.place is not None or own.segment in (*_FOLLOWED, "head")
 
 
 def _standing(recording: Recording) -> tuple[list[str], Array]:
