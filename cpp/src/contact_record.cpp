@@ -21,7 +21,7 @@ ContactRecord::ContactRecord(const Model& model, const ContactTrial& of)
 }
 
 void ContactRecord::report(std::size_t k, const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
-                           const Eigen::MatrixXd* P, double* moments_out, double* moments_sd) {
+                           double* moments_out) {
   const std::size_t n = trial.segments.size(), first = k * n;
   const auto size = static_cast<Eigen::Index>(6 * n);
   std::copy_n(trial.contact.begin() + static_cast<std::ptrdiff_t>(first), n, loads_.contact.begin());
@@ -35,7 +35,6 @@ void ContactRecord::report(std::size_t k, const StateRef& x, const KinematicStat
                                 ": the covariance of the sum of the contacts' wrenches is not positive definite");
   const auto nc = static_cast<Eigen::Index>(moments.sources().size());
   moments.moments(state, dynamics, Eigen::Map<Eigen::VectorXd>(moments_out, nc));
-  if (P) moments.deviations(x, state, dynamics, *P, moments_sd, wrench_sd.data() + 6 * first);
   for (std::size_t i = 0; i < n; ++i) {
     Eigen::Map<Vector6>(wrench.data() + 6 * (first + i)) = moments.wrenches()[i];
     Eigen::Map<Vector6>(adjustment.data() + 6 * (first + i)) = moments.adjustments()[i];
@@ -44,6 +43,11 @@ void ContactRecord::report(std::size_t k, const StateRef& x, const KinematicStat
   std::transform(moments.sources().begin(), moments.sources().end(),
                  source.begin() + static_cast<std::ptrdiff_t>(k * moments.sources().size()),
                  [](MomentSource s) { return static_cast<std::uint8_t>(s); });
+}
+
+void ContactRecord::deviations(std::size_t k, const StateRef& x, const KinematicState& state,
+                               const DynamicState& dynamics, const Eigen::MatrixXd& P, double* moments_sd) {
+  moments.deviations(x, state, dynamics, P, moments_sd, wrench_sd.data() + 6 * k * trial.segments.size());
 }
 
 }  // namespace dynakin

@@ -31,7 +31,8 @@ ContactMoments::ContactMoments(const Model& model, std::vector<int> segments)
       source_(model.coordinates().size(), MomentSource::measured),
       external_(model.segments().size()),
       work_(model),
-      variances_(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size()) {
+      variances_(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size()),
+      row_covariance_(model.state_size()) {
   if (model.contacts() > contacts())
     throw std::invalid_argument("contacts: " + std::to_string(contacts()) + " segments, expected one for each of the " +
                                 std::to_string(model.contacts()) + " that the model has states of");
@@ -44,7 +45,6 @@ ContactMoments::ContactMoments(const Model& model, std::vector<int> segments)
   lever_.assign(segments_.size(), Lever::Zero(nc, 6));
   common_.setZero(nc, 6);
   wrench_J_.setZero(6, model.state_size());
-  wrench_PJ_.setZero(model.state_size(), 6);
   J_.setZero(nc, model.state_size());
 }
 
@@ -161,11 +161,8 @@ void ContactMoments::deviations(const StateRef& x, const KinematicState& state, 
     }
     moments_sd[c] = std::sqrt(std::max(moments_sd[c], 0.0));
   }
-  wrench_PJ_.setZero();
-  for (const int c : model_.wrench_columns())
-    for (int k = 0; k < 6; ++k) wrench_PJ_.col(k) += wrench_J_(k, c) * P.col(c);
-  Matrix6 needed = Matrix6::Zero();  // covariance of what the state needs
-  for (const int c : model_.wrench_columns()) needed.noalias() += wrench_J_.col(c) * wrench_PJ_.row(c);
+  // covariance of what the state needs
+  const Matrix6& needed = row_covariance_.of_states(wrench_J_, model_.wrench_columns(), P);
   for (std::size_t k = 0; k < n; ++k) {
     Eigen::Map<Vector6> sd(wrench_sd + 6 * k);
     if (!touches(k)) {
@@ -174,7 +171,9 @@ void ContactMoments::deviations(const StateRef& x, const KinematicState& state, 
     }
     Matrix6 C = share_[k] * needed * share_[k].transpose() + block(k, k) - share_[k] * with_sum_[k].transpose();
     if (const int c = column(k); c != k_none) {
-      const Matrix6 own = effects(k), with_need = share_[k] * wrench_PJ_.middleRows<6>(c).transpose() * own.transpose();
+      Matrix6 JP = Matrix6::Zero();  // of what the state needs with the contact's states
+      for (const int j : model_.wrench_columns()) JP += wrench_J_.col(j) * P.block<6, 1>(c, j).transpose();
+      const Matrix6 own = effects(k), with_need = share_[k] * JP * own.transpose();
       C += with_need + with_need.transpose() + own * P.block<6, 6>(c, c) * own.transpose();
     }
     sd = C.diagonal().cwiseMax(0.0).cwiseSqrt();

@@ -27,9 +27,9 @@ double normalised_square(const Matrix6& S, const Vector6& v, int rows) {
 }  // namespace
 
 Gate::Gate(const Model& model)
-    : n_markers_(static_cast<int>(model.markers().size())), verdicts_(n_markers_ + 1, Verdict::missing) {
-  HP_.setZero(model.state_size(), 6);
-  gathered_.setZero(model.state_size());
+    : n_markers_(static_cast<int>(model.markers().size())),
+      verdicts_(n_markers_ + 1, Verdict::missing),
+      covariance_(model.state_size()) {
   sensors_.innovation = sensors_.innovation_sd = Eigen::VectorXd::Constant(3 * n_markers_ + 6, std::nan(""));
   sensors_.test_ratio = Eigen::VectorXd::Constant(n_markers_ + 1, std::nan(""));
 }
@@ -64,21 +64,7 @@ Verdict Gate::judge(int sensor, const RowBlock& block, const GateLimits& limits,
   // S = H P H' + R is no smaller than R: what R alone explains needs no more, and that is nearly every frame.
   const bool explained = std::isinf(limit) || normalised_square(block.R, block.v, rows) <= limit;
   if (explained && !reports_) return Verdict::accepted;
-  const std::vector<int>& columns = *block.columns;
-  const int n = static_cast<int>(columns.size());
-  // H P H' over the block's own columns of P, gathered one at a time.
-  auto HP = HP_.topLeftCorner(n, rows);
-  auto gathered = gathered_.head(n);
-  HP.setZero();
-  for (int c = 0; c < n; ++c) {
-    const double* column = P.col(columns[c]).data();
-    for (int d = 0; d < n; ++d) gathered(d) = column[columns[d]];
-    for (int r = 0; r < rows; ++r) HP.col(r) += block.H(r, c) * gathered;
-  }
-  Matrix6 S = block.R;
-  for (int c = 0; c < n; ++c)
-    for (int r = 0; r < rows; ++r)
-      for (int s = 0; s <= r; ++s) S(r, s) += HP(c, r) * block.H(s, c);
+  const Matrix6 S = block.R + covariance_(block.H.topRows(rows), *block.columns, P);
   const double square = normalised_square(S, block.v, rows);
   for (int r = 0; reports_ && r < rows; ++r) {
     sensors_.innovation(block.channel[r]) = block.v(r);

@@ -62,7 +62,16 @@ void scale_decaying(const FilterSettings& settings, int first, double dt, Eigen:
     kept(i) = rate == 0.0 ? 1.0 : std::exp(-rate * dt);
   }
   x.tail(rest).array() *= kept.array();
-  for (int c = 0; c < size; ++c) P.col(c).tail(rest).array() *= kept.array() * (c < first ? 1.0 : kept(c - first));
+  const auto decays = [&](int i) { return i >= first && settings.decay_rate(i) != 0.0; };
+  for (int i = first, end; i < size; i = end) {  // of columns that do not decay only the rows that do
+    for (end = i + 1; end < size && decays(end) == decays(i);) ++end;
+    if (!decays(i)) continue;
+    const auto rows = kept.segment(i - first, end - i).array();
+    for (int c = 0; c < size; ++c)
+      if (!decays(c)) P.col(c).segment(i, end - i).array() *= rows;
+  }
+  for (int c = first; c < size; ++c)
+    if (decays(c)) P.col(c).tail(rest).array() *= kept.array() * kept(c - first);
 }
 
 }  // namespace

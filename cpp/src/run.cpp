@@ -4,8 +4,6 @@
 #include <chrono>
 #include <string>
 
-#include "dynakin/reports.hpp"
-
 namespace dynakin {
 
 namespace {
@@ -40,7 +38,8 @@ StateRecord::StateRecord(const Model& of, std::size_t frames, Said what)
   if (said == Said::deviations) deviation.emplace(model);
 }
 
-void StateRecord::report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P, ContactRecord* contacts) {
+void StateRecord::report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P, ContactRecord* contacts,
+                         Helper* helper) {
   const std::size_t n = x.size(), m = kinematics_.markers.size(), nc = model.coordinates().size();
   Eigen::Map<Eigen::VectorXd>(state.data() + k * n, x.size()) = x;
   Eigen::Map<Eigen::VectorXd>(state_sd.data() + k * n, x.size()) = P.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -50,15 +49,24 @@ void StateRecord::report(std::size_t k, const Eigen::VectorXd& x, const Eigen::M
   for (std::size_t i = 0; i < m; ++i) Eigen::Map<Vector3>(markers.data() + 3 * (k * m + i)) = kinematics_.markers[i];
   Eigen::Map<Vector6>(wrench.data() + 6 * k) = dynamics_.wrench.vector();
   double* const moment = moments.data() + k * nc;
-  double* const moment_sd = deviation ? moments_sd.data() + k * nc : nullptr;
   if (contacts)
-    contacts->report(k, x, kinematics_, dynamics_, deviation ? &P : nullptr, moment, moment_sd);
+    contacts->report(k, x, kinematics_, dynamics_, moment);
   else
     joint_moments(model, kinematics_, dynamics_, nullptr, Eigen::Map<Eigen::VectorXd>(moment, nc));
   if (!deviation) return;
-  deviation->markers(kinematics_, P, markers_sd.data() + 3 * k * m);
-  deviation->wrench(kinematics_, dynamics_, P, wrench_sd.data() + 6 * k);
-  if (!contacts) deviation->moments(x, kinematics_, dynamics_, P, moment_sd);
+  const auto deviations = [&](int of_moments) {
+    double* const moment_sd = moments_sd.data() + k * nc;
+    if (!of_moments) {
+      deviation->markers(kinematics_, P, markers_sd.data() + 3 * k * m);
+      deviation->wrench(kinematics_, dynamics_, P, wrench_sd.data() + 6 * k);
+    } else if (contacts) {
+      contacts->deviations(k, x, kinematics_, dynamics_, P, moment_sd);
+    } else {
+      deviation->moments(x, kinematics_, dynamics_, P, moment_sd);
+    }
+  };
+  if (helper) return helper->share(2, deviations);
+  for (const int of_moments : {1, 0}) deviations(of_moments);
 }
 
 RunRecord::RunRecord(const Model& of, std::size_t frames, Said what, bool of_sensors)
@@ -104,7 +112,6 @@ void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size
   WrenchModel how;
   std::optional<Helped> helped;
   if (end - first > 1) helped.emplace(filter);  // else whoever goes frame by frame sees to that
-  Reports reports(record, contacts, helped && *helped);
   for (std::size_t k = first; k < end; ++k) {
     const auto start = clock::now();
     const StepReport report = step(filter, trial, k, how);
@@ -132,9 +139,8 @@ void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size
       keep(filter.sensors().innovation_sd, record.innovation_sd);
       keep(filter.sensors().test_ratio, record.test_ratio);
     }
-    reports.add(k, filter.state(), filter.covariance());
+    record.report(k, filter.state(), filter.covariance(), contacts, helped ? &helped->helper() : nullptr);
   }
-  reports.end();
 }
 
 }  // namespace dynakin

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import Event
 
 import numpy as np
 import pytest
 
 import dynakin
 from dynakin.filter.prepared import Prepared
+from dynakin.pipeline.stages import _Ahead
+from dynakin.report import page
 from dynakin.simulation.trial import simulate
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.engine.tasks import Task
@@ -57,6 +62,47 @@ def test_the_second_thread_of_a_step_changes_no_bit(ready, monkeypatch):
         found.append(smoothed(ready, "fullbody 1") | {f"live_{key}": value for key, value in live.items()})
     for array in found[0].keys() - TIMES - {f"live_{key}" for key in TIMES}:
         assert found[0][array].tobytes() == found[1][array].tobytes(), array
+
+
+def threads_more(run: Callable[[], object]) -> int:
+    """How many threads this process has more than before while ``run`` runs."""
+    done, seen = Event(), list[int]()
+
+    def watch() -> None:
+        while not done.is_set():
+            seen.append(len(list(Path("/proc/self/task").iterdir())))
+
+    with ThreadPoolExecutor(1) as pool:
+        watching = pool.submit(watch)
+        while not seen:
+            pass
+        before = seen[-1]
+        run()
+        done.set()
+        watching.result()
+    return max(seen) - before
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="threads are counted as Linux lists them")
+def test_the_second_thread_waits_for_what_is_loaded_ahead(ready, monkeypatch):
+    """On two processors, which the core and that thread need: a third would have all take turns."""
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    one, begun, go_on = ready["fullbody 1"], Event(), Event()
+
+    def run() -> None:
+        one.tracker.fresh().run_arrays(one.measured)
+
+    monkeypatch.setattr(page, "templates", lambda: (begun.set(), go_on.wait()))
+    assert threads_more(run) == 1
+    ahead = _Ahead(None)
+    ahead.start()
+    try:
+        assert begun.wait(60.0)
+        assert threads_more(run) == 0
+    finally:
+        go_on.set()
+        ahead.join()
+    assert threads_more(run) == 1
 
 
 @pytest.mark.parametrize("side_by_side", [by_executor, by_engine])

@@ -23,10 +23,13 @@ struct ContactRecord {
   // The trial must outlive it. Throws std::invalid_argument where the model has states of other contacts.
   ContactRecord(const Model& model, const ContactTrial& trial);
 
-  // Frame k: its moments (coordinates) and, where asked, their standard deviations. Throws std::invalid_argument where
-  // the covariance of the wrenches' sum is not positive definite.
+  // Frame k and its moments (coordinates). Throws std::invalid_argument where the covariance of the wrenches' sum is
+  // not positive definite.
   void report(std::size_t k, const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
-              const Eigen::MatrixXd* P, double* moments_out, double* moments_sd);
+              double* moments_out);
+  // Then, of the same frame, their standard deviations and those of the wrenches.
+  void deviations(std::size_t k, const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
+                  const Eigen::MatrixXd& P, double* moments_sd);
 
   const ContactTrial& trial;
   ContactMoments moments;

@@ -91,9 +91,9 @@ class ContactMoments {
   std::vector<Lever> lever_;  // G_i: d (power of contact i's wrench) / d speed of each coordinate
   Lever common_;              // D = sum of G_i A_i
   Eigen::Matrix<double, 6, Eigen::Dynamic> wrench_J_;
-  Eigen::Matrix<double, Eigen::Dynamic, 6> wrench_PJ_;  // P J'
   Eigen::MatrixXd J_;
   RowVariances variances_;
+  RowCovariance row_covariance_;
 };
 
 }  // namespace dynakin

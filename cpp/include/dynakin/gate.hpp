@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dynakin/measurement.hpp"
+#include "dynakin/row_covariance.hpp"
 
 namespace dynakin {
 
@@ -44,8 +45,7 @@ class Gate {
   std::vector<Verdict> verdicts_;
   bool reports_ = false;
   SensorReport sensors_;
-  Eigen::Matrix<double, Eigen::Dynamic, 6> HP_;
-  Eigen::VectorXd gathered_;
+  RowCovariance covariance_;
 };
 
 }  // namespace dynakin

@@ -5,19 +5,9 @@
 #include <vector>
 
 #include "dynakin/moment_derivatives.hpp"
+#include "dynakin/row_covariance.hpp"
 
 namespace dynakin {
-
-// out[k] = (J P J')_kk. Most columns of J (rows, n) are zero, and cost nothing: the others are gathered.
-class RowVariances {
- public:
-  RowVariances(Eigen::Index rows, Eigen::Index states);
-  void operator()(const Eigen::Ref<const Eigen::MatrixXd>& J, const Eigen::MatrixXd& P, double* out);
-
- private:
-  std::vector<Eigen::Index> columns_;  // of J, those that are not zero
-  Eigen::MatrixXd J_, P_, JP_;         // over these
-};
 
 // Allocated once for a model. x, kinematics and dynamics belong together; P is the covariance of x.
 class OutputDeviation {
@@ -39,7 +29,8 @@ class OutputDeviation {
   Eigen::Matrix<double, 6, Eigen::Dynamic> wrench_J_;
   MomentWorkspace work_;
   Eigen::MatrixXd moment_J_;
-  RowVariances wrench_variances_, moment_variances_;
+  RowCovariance row_covariance_;
+  RowVariances moment_variances_;
 };
 
 }  // namespace dynakin

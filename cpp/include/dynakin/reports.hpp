@@ -1,5 +1,5 @@
-// What is reported of frames with their deviations takes a quarter of a step: where another thread may be at work
-// (threads.hpp), it does that while whoever finds the frames goes on. The numbers are the same to the last bit.
+// What is reported of smoothed frames with their deviations: where another thread may be at work (threads.hpp), it does
+// that while whoever finds the frames goes on. The numbers are the same to the last bit.
 #pragma once
 
 #include <atomic>

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynakin/contact_record.hpp"
+#include "dynakin/helper.hpp"
 #include "dynakin/output_sd.hpp"
 #include "dynakin/threads.hpp"
 #include "dynakin/trial.hpp"
@@ -28,8 +29,9 @@ enum class Said { state, outputs, deviations };
 struct StateRecord {
   StateRecord(const Model& model, std::size_t frames, Said said);
 
-  // Frame k; contacts: as in run_frames.
-  void report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P, ContactRecord* contacts);
+  // Frame k; contacts: as in run_frames. helper: takes a share of the deviations, which changes no bit of them.
+  void report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P, ContactRecord* contacts,
+              Helper* helper = nullptr);
 
   const Model& model;
   const Said said;
@@ -59,15 +61,15 @@ struct RunRecord : StateRecord {
   std::vector<std::uint8_t> at_limit;  // (frames, free coordinates), which the filter held at an end of its range
 };
 
-// A place for a second thread (threads.hpp) as long as this lives, false where there is none; it helps the filter where
-// the model is large enough.
+// A place for a second thread (threads.hpp) as long as this lives: where there is one, and the model is large enough,
+// it helps the filter and whoever asks for it.
 class Helped {
  public:
   explicit Helped(Filter& filter);
   ~Helped() { filter_.share_with(nullptr); }
   Helped(const Helped&) = delete;
   Helped& operator=(const Helped&) = delete;
-  explicit operator bool() const { return static_cast<bool>(other_); }
+  Helper& helper() { return helper_; }
 
  private:
   Filter& filter_;

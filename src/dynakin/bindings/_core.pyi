@@ -457,6 +457,17 @@ def whole_body(model: Model, states: Annotated[NDArray[numpy.float64], dict(shap
     Of states (T, n), with the wrenches foot_wrench (T, F, 6) on the named segments: mass (T,) kg, mass_centre and mass_centre_velocity (T, 3), joint_centres (T, S, 3) and orientations (T, S, 3, 3) R_GB of the segments, and joint_loads (T, S, 6): force and moment of the parent on each segment, ground axes, about its joint centre.
     """
 
+class AtWork:
+    """
+    Within it a thread of the caller's counts as one that is at work in this process: the core's second threads keep off its processor (OMP_NUM_THREADS, else as many as the machine has).
+    """
+
+    def __init__(self) -> None: ...
+
+    def __enter__(self) -> AtWork: ...
+
+    def __exit__(self, *args) -> None: ...
+
 class RecoverySettings:
     """When the motion counts as lost, and how it is sought anew."""
 

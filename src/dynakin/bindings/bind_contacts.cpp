@@ -92,7 +92,8 @@ nb::dict contact_moments(const Model& model, const StateRef& x, const PyContactL
   one.frames = 1;
   ContactRecord record(model, one);
   std::vector<double> moments(nc), moments_sd(P ? nc : 0);
-  record.report(0, x, at.kinematics, at.dynamics, P ? &*P : nullptr, moments.data(), moments_sd.data());
+  record.report(0, x, at.kinematics, at.dynamics, moments.data());
+  if (P) record.deviations(0, x, at.kinematics, at.dynamics, *P, moments_sd.data());
   nb::dict out;
   out["moments"] = owned(std::move(moments), {nc});
   if (jacobian) {

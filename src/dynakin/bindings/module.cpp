@@ -8,6 +8,7 @@ NB_MODULE(_core, m) {
   bind_model(m);
   bind_mechanics(m);
   bind_contacts(m);
+  bind_threads(m);
   bind_filter(m);
   bind_fixed_lag(m);
 }

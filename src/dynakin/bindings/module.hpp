@@ -13,6 +13,7 @@ void bind_spec(nb::module_& m);
 void bind_model(nb::module_& m);
 void bind_mechanics(nb::module_& m);
 void bind_contacts(nb::module_& m);
+void bind_threads(nb::module_& m);
 void bind_filter(nb::module_& m);
 void bind_run(nb::class_<dynakin::Filter>& filter);
 void bind_score(nb::class_<dynakin::Filter>& filter);

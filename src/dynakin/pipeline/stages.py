@@ -9,6 +9,7 @@ from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
+from dynakin.bindings import _core
 from dynakin.blas import one_blas_thread
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.filter.prepared import Prepared
@@ -192,7 +193,7 @@ class _Ahead(Thread):
 
     def run(self) -> None:
         """In a thread of its own."""
-        with suppress(Exception):
+        with suppress(Exception), _core.AtWork():
             import xarray as xr  # first: the estimate itself is one
 
             xr.Dataset(coords={"axis": ["x"]})  # its first one has xarray load Dask, where that is installed
