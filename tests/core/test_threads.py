@@ -92,7 +92,11 @@ def test_the_second_thread_waits_for_what_is_loaded_ahead(ready, monkeypatch):
     def run() -> None:
         one.tracker.fresh().run_arrays(one.measured)
 
-    monkeypatch.setattr(page, "templates", lambda: (begun.set(), go_on.wait()))
+    def templates() -> None:
+        begun.set()
+        go_on.wait()
+
+    monkeypatch.setattr(page, "templates", templates)
     assert threads_more(run) == 1
     ahead = _Ahead(None)
     ahead.start()

@@ -29,5 +29,5 @@ void bind_threads(nb::module_& m) {
                        "second threads keep off its processor (OMP_NUM_THREADS, else as many as the machine has).")
       .def(nb::init<>())
       .def("__enter__", &PyAtWork::enter, nb::rv_policy::reference)
-      .def("__exit__", &PyAtWork::exit);
+      .def("__exit__", &PyAtWork::exit, nb::sig("def __exit__(self, *args: object) -> None"));
 }
