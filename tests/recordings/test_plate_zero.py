@@ -184,7 +184,7 @@ def test_a_handle_that_is_pulled_keeps_its_load(part: float) -> None:
     """It carries across the plate's normal, where it read -60 N before and nothing during the pull."""
     handle = np.tile([0.0, -6.0, 0.0, 0.0, 0.0, 0.0], (1000, 1))
     handle[: round(1000 * part), 0] = 60.0
-    found = zero_of("plate 9", handle, np.array([0.0, 1.0, 0.0]))
+    found = zero_of("plate 9", handle, np.array([0.0, 1.0, 0.0]), 1000.0)
     assert not found.wrench.any() and found.reads_n == -6.0
     assert "plate 9 reads -6 N where nobody stands on it, but with a load across it (not" in str(found.said[0])
 
@@ -192,5 +192,19 @@ def test_a_handle_that_is_pulled_keeps_its_load(part: float) -> None:
 def test_a_short_pull_leaves_the_zero_of_the_rest() -> None:
     handle = np.tile([2.0, -6.0, 1.0, 0.0, 0.0, 0.0], (1000, 1))
     handle[:100, 0] = 60.0
-    found = zero_of("plate 9", handle, np.array([0.0, 1.0, 0.0]))
+    found = zero_of("plate 9", handle, np.array([0.0, 1.0, 0.0]), 1000.0)
     np.testing.assert_allclose(found.wrench[:3], [2.0, -6.0, 1.0])
+
+
+@pytest.mark.parametrize("rate", [1000.0, 100.0])
+@pytest.mark.parametrize("noise_n", [0.5, 7.0])
+def test_noise_is_no_handle_that_is_pulled(noise_n: float, rate: float) -> None:
+    """From 5.6 N of it a fifth of the single samples lies farther off than a steady load may."""
+    zero = np.array([4.5, -15.0, 6.0, 0.3, -0.2, 0.1])
+    read = zero + np.random.default_rng(1).normal(0.0, 1.0, (4000, 6)) * ([noise_n] * 3 + [0.1 * noise_n] * 3)
+    read[1500:2500, 1] += 700.0
+    found = zero_of("plate 1", read, np.array([0.0, 1.0, 0.0]), rate)
+    np.testing.assert_allclose(found.wrench, zero, atol=0.1 * noise_n)
+    assert found.reads_n == 0.0 and found.said[0].level == "warning"
+    pulled = read + np.outer(np.arange(4000) > 2800, [60.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert not zero_of("plate 1", pulled, np.array([0.0, 1.0, 0.0]), rate).wrench.any()

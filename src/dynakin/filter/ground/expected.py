@@ -24,7 +24,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import FootLoads
-from dynakin.recordings.plates.pressure import pressed_at
+from dynakin.recordings.plates.pressure import free_moments, pressed_at
 from dynakin.recordings.pushes import LOADED_N
 from dynakin.settings.contacts import SEAT
 from dynakin.settings.noise import Noise
@@ -113,7 +113,11 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
     places = np.where(np.isfinite(places), places, (root * [1.0, 0.0, 1.0])[:, None])
     gain_errors = np.zeros((frames, K))
     gain_errors[:, :F] = plates.gain_error_of_feet(loads)
-    by_plates = plate_covariances(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), plates, gain_errors.reshape(-1))
+    turn_errors = np.zeros((frames, K))
+    turn_errors[:, :F] = plates.turn_error_of_feet(loads)
+    by_plates = plate_covariances(
+        wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), plates, gain_errors.reshape(-1), turn_errors.reshape(-1)
+    )
     errors[:, each, :, each] = by_plates.reshape(frames, K, 6, 6).swapaxes(0, 1)
     for k in range(K):
         off = unmeasured[:, k]
@@ -136,7 +140,15 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
     for group in (range(F), *([F + own.index(name) for name in names] for names in loads.sharing)):
         shares = contact[:, group] == SHARED_PLATE
         for t in np.flatnonzero(shares.any(axis=1)):
-            _divide(int(t), np.asarray(group)[shares[t]], priors, wrench, errors, places, plates, gain_errors)
+            feet_on = np.asarray(group)[shares[t]]
+            plate = plate_covariances(
+                wrench[t, feet_on].sum(axis=0)[None],
+                places[t, feet_on[:1]],
+                plates,
+                gain_errors[t, feet_on[:1]],
+                turn_errors[t, feet_on[:1]],
+            )
+            _divide(int(t), feet_on, priors, wrench, errors, plate[0])
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -161,13 +173,18 @@ def residual_sd(noise: Noise, initial: CalibratedModel) -> Array:
 
 
 def plate_covariances(
-    wrench: Array, contact: Array, off: PlateErrors = NO_ERRORS, gain_error: Array | float = 0.0
+    wrench: Array,
+    contact: Array,
+    off: PlateErrors = NO_ERRORS,
+    gain_error: Array | float = 0.0,
+    turn_error_nm: Array | float = 0.0,
 ) -> Array:
     """Covariances (T, 6, 6) about the ground's origin of what a plate says, (T, 6) about it too: at its centre of
     pressure on the level of the contact (T, 3) m, at that itself where the plate is hardly loaded.
 
     Args:
         gain_error: (T,) part of its load by which the plate may be off, all of it or a sensor's `SENSOR_M` away.
+        turn_error_nm: (T,) N m, of its moment about the vertical.
     """
     push, pressure = np.maximum(np.abs(wrench[:, 1]), LOADED_N), contact.copy()
     at = pressed_at(wrench, contact[:, 1])
@@ -176,7 +193,8 @@ def plate_covariances(
     shear = np.hypot(shear, gain_error * np.hypot(wrench[:, 0], wrench[:, 2]))
     lift = np.hypot(PLATE_NOISE_N, np.hypot(PLATE_GAIN, gain_error) * push)
     moment = np.hypot(PLATE_NOISE_NM, np.hypot(PLATE_PLACE_M, SENSOR_M * gain_error) * push)
-    twist = shear if off.unmeasured else moment
+    turning = np.hypot(turn_error_nm, off.turn_gain_error * free_moments(wrench))
+    twist = shear if off.unmeasured else np.hypot(moment, turning)
     return _about(pressure, np.stack([shear, lift, shear, moment, twist, moment], axis=1))
 
 
@@ -243,14 +261,11 @@ def _divide(
     priors: dict[int, Prior],
     wrench: Array,
     errors: Array,
-    places: Array,
-    plates: PlateErrors,
-    gain_errors: Array,
+    plate: Array,
 ) -> None:
-    """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
+    """A frame's plate, of covariance (6, 6), among the feet on it, in place: their priors, given the sum that it
+    measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
-    first = feet[:1]
-    plate = plate_covariances(wrench[t, feet].sum(axis=0)[None], places[t, first], plates, gain_errors[t, first])[0]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
     root = np.linalg.cholesky(S)

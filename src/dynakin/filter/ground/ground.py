@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dynakin.arrays import Flags
 from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
@@ -42,3 +42,10 @@ class Ground:
     clock_sd_s: float = 0.0
     in_hands_kg: float = 0.0
     doubt: Message | None = None
+
+    def with_turn(self, found: PlateErrors) -> Ground:
+        """The same, with what is wrong with the plates' moment about the vertical."""
+        said = (*self.errors.said, *found.said)
+        gain = found.turn_gain_error
+        errors = replace(self.errors, turn_error_nm=found.turn_error_nm, turn_gain_error=gain, said=said)
+        return replace(self, errors=errors, notes=(*self.notes, *found.said))

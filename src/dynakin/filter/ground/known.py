@@ -17,8 +17,10 @@ from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.judged import judged
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.on_ground import GroundTrial, OnGround
+from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
 from dynakin.filter.ground.plate_sum import MASS_APART, Empty, doubtful_mass, mean_load_kg
-from dynakin.messages import Message, note, warning
+from dynakin.filter.ground.turn import found_turn
+from dynakin.messages import Message, about, note, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.zero_offset import without_blanks, without_offsets
 from dynakin.recordings.recording import Recording
@@ -66,7 +68,9 @@ def known_ground(
     ground, known = judged(on_ground)
     clock = _Clock(coarse, 0.0 if coarse is None else coarse.sd_s, ())
     if ground.loads is not None and ground.loads.on.any():
-        clock, ground, known = _in_step(as_it_is, coarse, on_ground, ground, known)
+        turn = NO_ERRORS if about(ground.notes, "rate") or says_carried(ground.notes) else _turn(on_ground, known)
+        clock, ground, known = _in_step(as_it_is, coarse, on_ground, ground, known, not turn.said)
+        ground = ground.with_turn(turn)
     if ground.loads is not None and ground.loads.misgiven:  # in step: late plates are pressed where nobody is any more
         raise ConfigError(ground.loads.misgiven)
     moved = () if clock.taken is None else (_taken_in_words(clock.taken, recording, not initial.unseen_kg),)
@@ -75,6 +79,12 @@ def known_ground(
     load_kg = mean_load_kg(known, least=50) if ground.load_ratio is None else ground.load_ratio * initial.weighed_kg
     doubt = None if load_kg is None else doubtful_mass(initial, load_kg, Empty.of(trial.recording.plates, known))
     return replace(ground, notes=notes, behind_s=behind_s, clock_sd_s=clock.sd_s, doubt=doubt), known
+
+
+def _turn(on_ground: OnGround, known: Array) -> PlateErrors:
+    """What is wrong with the plates' moment about the vertical, which looks like a delay as well."""
+    trial = on_ground.trial
+    return found_turn(trial.needed, known, trial.wrenches, [plate.name for plate in trial.recording.plates])
 
 
 class _Clock(NamedTuple):
@@ -87,19 +97,20 @@ class _Clock(NamedTuple):
 
 
 def _in_step(
-    as_it_is: OnGround, coarse: Delay | None, on_ground: OnGround, ground: Ground, known: Array
+    as_it_is: OnGround, coarse: Delay | None, on_ground: OnGround, ground: Ground, known: Array, turns: bool
 ) -> tuple[_Clock, Ground, Array]:
     """How far the plates are out of step, to a millisecond or two where the movement shows it, and what is known of
     the ground once they are not.
 
     Args:
         coarse: the delay that ``on_ground``, and what was judged of it (``ground``, ``known`` (T, 6)), are without.
+        turns: whether the plates' moment about the vertical is to be believed.
     """
     trial, initial = as_it_is.trial, as_it_is.trial.initial
     whole, fine, left = not initial.unseen_kg, None, None
     for _ in range(ROUNDS):
         plates = on_ground.trial.wrenches
-        left = clock_delay(trial.needed, known, not says_carried(ground.notes), plates)
+        left = clock_delay(trial.needed, known, not says_carried(ground.notes), plates, turns)
         if left is None or not left.worth_it(whole or coarse is not None or fine is not None):
             break
         fine = left.after(fine or coarse or IN_STEP)

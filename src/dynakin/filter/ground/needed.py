@@ -13,6 +13,7 @@ import numpy as np
 
 from dynakin.arrays import Array, Flags
 from dynakin.filter.ground.mass_centre import MassCentre, mass_centre
+from dynakin.filter.ground.stretches import Moving
 from dynakin.filter.sight import owners_of, root_of
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.times import rate_of
@@ -46,6 +47,11 @@ class Needed:
     def centre(self) -> MassCentre | None:
         """The centre of mass; None where no stretch of the markers shows it."""
         return mass_centre(self.initial, self.time, self.markers)
+
+    @cached_property
+    def moving(self) -> Moving:
+        """The same by inverse kinematics, in stretches."""
+        return Moving(self.initial, self.time, self.markers)
 
     @cached_property
     def force(self) -> Array:

@@ -27,6 +27,8 @@ class PlateErrors:
         gain: (P,) what each says over what it should, as far as that is known; 1 of plates of which one is wrong and
             nobody knows which.
         said: what there is to say, of what looks like such errors, too.
+        turn_error_nm: (P,) N m by which the moment about the vertical of each may be off while it is loaded.
+        turn_gain_error: part of any free moment by which it may be off, too.
         borne: (C,) declared contacts that it is laid to instead.
     """
 
@@ -37,6 +39,8 @@ class PlateErrors:
     gain: Array | float = 1.0
     said: tuple[Message, ...] = ()
     borne: Flags | bool = False
+    turn_error_nm: Array | float = 0.0
+    turn_gain_error: float = 0.0
 
     def shear_sd(self, wrench: Array) -> Array:
         """(T,) N, of each horizontal component of a plate's wrench (T, 6), because any may have all of the zero; 0
@@ -49,6 +53,10 @@ class PlateErrors:
     def gain_error_of_feet(self, loads: FootLoads) -> Array:
         """(T, F) part of its load by which what each foot stands on may be off."""
         return np.asarray((loads.on * self.gain_error).max(axis=2, initial=0.0))
+
+    def turn_error_of_feet(self, loads: FootLoads) -> Array:
+        """(T, F) N m by which the moment about the vertical of what each foot stands on may be off."""
+        return np.asarray((loads.on * self.turn_error_nm).max(axis=2, initial=0.0))
 
     def zeroed(self, wrench: Array) -> Array:
         """The sum over the plates (T, 6) without its zero."""

@@ -142,7 +142,7 @@ def read_plates(
     notes += said
     plates = []
     for raw in (raw.without(lost) for raw, lost in zip(raws, dead, strict=True)):
-        zero = zero_of(raw.name, np.hstack([raw.force, raw.moment]), raw.surface.normal)
+        zero = zero_of(raw.name, np.hstack([raw.force, raw.moment]), raw.surface.normal, 1.0 / step)
         notes += zero.said
         raw = replace(raw, force=raw.force - zero.wrench[:3], moment=raw.moment - zero.wrench[3:])
         plate = _at_marker_times(raw, analog_time, time, options, zero_unloaded=not zero.reads_n > 0.0)

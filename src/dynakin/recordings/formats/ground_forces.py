@@ -157,9 +157,9 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
     untouched = same_times(table.time, recording.time)
     as_it_is = untouched and options.plate_filter_hz is None and options.force_threshold_n is None
     hung = [_frozen(plate, table.time) for plate in plates]
-    up = main_push(plates)
+    up, rate = main_push(plates), rate_of(table.time)
     zeros = [
-        zero_of(plate.name, np.where(lost[:, None], np.nan, plate.wrench), up, emptied=not as_it_is)
+        zero_of(plate.name, np.where(lost[:, None], np.nan, plate.wrench), up, rate, emptied=not as_it_is)
         for plate, lost in zip(plates, hung, strict=True)
     ]
     plates = tuple(

@@ -62,6 +62,14 @@ def pressed_at(wrench: Array, height_m: float | Array = 0.0, least_n: float = LO
     return np.stack([mz + fx * height_m, fz * height_m - mx], axis=-1) / push[..., None]
 
 
+def free_moments(wrench: Array, least_n: float = LOADED_N) -> Array:
+    """(...,) N m about the vertical where wrenches (..., 6) press; 0 where the push is below ``least_n``. What is not
+    known counts as 0."""
+    known, at = filled(wrench), pressed_at(wrench, least_n=least_n)
+    free = known[..., 4] - at[..., 1] * known[..., 0] + at[..., 0] * known[..., 2]
+    return np.where(np.isfinite(free), free, 0.0)
+
+
 def read_while_empty(push: Array) -> float:
     """What a plate reads without a load, N: the median of pushes (T,) along its normal that are none; 0 where that is
     noise, or where there are too few."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynakin.arrays import Array
+from dynakin.arrays import Array, mean_seen
 from dynakin.messages import Message, note, warning
 from dynakin.recordings.plates.pressure import part_pulling, read_while_empty
 from dynakin.recordings.pushes import JUDGED_N, LASTING_PULL, UNLOADED_N
@@ -14,6 +14,9 @@ from dynakin.recordings.pushes import JUDGED_N, LASTING_PULL, UNLOADED_N
 _OFFSET_WORTH_A_NOTE_N = 5.0
 _STEADY = 0.8
 """Part of what is read without a load that must be the same to `UNLOADED_N` for it to be the plate's zero."""
+_CALM_S = 0.05
+"""Time over which samples are averaged for it: noise of 7 N at 1000 Hz leaves 1 N (of single samples, in two
+dimensions, 36 % lie beyond `UNLOADED_N`), 50 and 60 Hz hum nothing or a tenth, and nobody pulls a handle so briefly."""
 
 
 class Zero(NamedTuple):
@@ -27,11 +30,14 @@ class Zero(NamedTuple):
     said: list[Message]
 
 
-def zero_of(name: str, wrench: Array, normal: Array, *, emptied: bool = True) -> Zero:
-    """Of a plate with this wrench (N, 6) N and N m, whose normal (3,) points towards the person; emptied: the reader
-    leaves nothing of what pulls."""
+def zero_of(name: str, wrench: Array, normal: Array, rate: float, *, emptied: bool = True) -> Zero:
+    """Of a plate with this wrench (N, 6) N and N m, whose normal (3,) points towards the person.
+
+    Args:
+        rate: Hz, of its samples. emptied: the reader leaves nothing of what pulls.
+    """
     push = wrench[:, :3] @ normal
-    known, reads = np.nan_to_num(push, nan=np.inf), read_while_empty(push)
+    reads = read_while_empty(push)
     pulls = part_pulling(push)
     if pulls > LASTING_PULL:
         text = (
@@ -39,12 +45,15 @@ def zero_of(name: str, wrench: Array, normal: Array, *, emptied: bool = True) ->
             f"of the recording{': taken as empty there' if emptied else ''}. Zero it before the trial."
         )
         return Zero(np.zeros(6), min(reads, 0.0), True, [warning("plates", text)])
+    calm = _averaged(wrench, rate)
+    along = calm[:, :3] @ normal
+    known = np.nan_to_num(along, nan=np.inf)
     own = np.abs(known - reads) < UNLOADED_N
     steadily = np.count_nonzero(own) >= _STEADY * np.count_nonzero(known < JUDGED_N)
-    if reads < 0.0 and steadily and _of_nobody(wrench[own, :3] - np.outer(push[own], normal)):
+    if reads < 0.0 and steadily and _of_nobody(calm[own, :3] - np.outer(along[own], normal)):
         text = f"{name} reads {reads:.3g} N where nobody stands on it: it is taken off over the whole trial."
         said = (warning if -reads > UNLOADED_N else note)("zero", text)
-        return Zero(np.nanmedian(wrench[own], axis=0), 0.0, False, [said])
+        return Zero(np.nanmedian(calm[own], axis=0), 0.0, False, [said])
     if abs(reads) < _OFFSET_WORTH_A_NOTE_N:
         return Zero(np.zeros(6), reads, False, [])
     why = "with a load across it" if steadily else "not steadily"
@@ -52,6 +61,14 @@ def zero_of(name: str, wrench: Array, normal: Array, *, emptied: bool = True) ->
     return Zero(
         np.zeros(6), reads, False, [note("plates", f"{name} reads {reads:.3g} N where nobody stands on it{left}.")]
     )
+
+
+def _averaged(values: Array, rate: float) -> Array:
+    """Means (K, C) of values (N, C), sampled at ``rate`` Hz, over each `_CALM_S`, of what is known of them."""
+    each = max(round(_CALM_S * rate), 1) if np.isfinite(rate) else 1
+    lacking = -len(values) % each
+    parts = np.concatenate([values, np.full((lacking, values.shape[1]), np.nan)])
+    return mean_seen(parts.reshape(-1, each, values.shape[1], 1), axis=1)[..., 0]
 
 
 def _of_nobody(across: Array) -> bool:

@@ -107,6 +107,12 @@ _KINDS = (
         "forces; if by the film something else bears the person there, declare it (--contact).",
     ),
     _Kind(
+        "Plates' vertical moment",
+        ("free moment",),
+        "Zero the plates with nobody on them; if it is not that, correct the sign, the unit or the calibration of "
+        "their moment about the vertical (Mz) in the file of the forces.",
+    ),
+    _Kind(
         "Plates' horizontal forces",
         ("vertical only",),
         "Export the horizontal forces as well, or record with plates that measure them.",
