@@ -19,7 +19,7 @@ from dynakin.arrays import Array, Flags, filled, mean_seen
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
 from dynakin.filter.ground.gain import SENSOR_M
 from dynakin.filter.ground.ground import Ground
-from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
+from dynakin.filter.ground.plate_errors import NO_ERRORS, NOISE_N, NOISE_NM, PlateErrors
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
@@ -30,8 +30,6 @@ from dynakin.settings.contacts import SEAT
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
 
-PLATE_NOISE_N, PLATE_NOISE_NM = 2.0, 0.5
-"""White noise of the usual plates, the moment about the centre of pressure."""
 PLATE_GAIN, PLATE_TURN_RAD, PLATE_PLACE_M = 0.01, 0.005, 0.002
 """Errors that grow with the load: of a plate's gain, how it lies turned, and where it lies."""
 PUSH_SD, PUSH_LEAST_SD = 0.4, 0.05
@@ -114,7 +112,8 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
     gain_errors = np.zeros((frames, K))
     gain_errors[:, :F] = plates.gain_error_of_feet(loads)
     by_plates = plate_covariances(wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), plates, gain_errors.reshape(-1))
-    errors[:, each, :, each] = by_plates.reshape(frames, K, 6, 6).swapaxes(0, 1)
+    white = plates.noise_of(loads, list(initial.contacts))
+    errors[:, each, :, each] = (by_plates.reshape(frames, K, 6, 6) + white).swapaxes(0, 1)
     for k in range(K):
         off = unmeasured[:, k]
         if not (off | (contact[:, k] == SHARED_PLATE)).any():
@@ -136,7 +135,8 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
     for group in (range(F), *([F + own.index(name) for name in names] for names in loads.sharing)):
         shares = contact[:, group] == SHARED_PLATE
         for t in np.flatnonzero(shares.any(axis=1)):
-            _divide(int(t), np.asarray(group)[shares[t]], priors, wrench, errors, places, plates, gain_errors)
+            own_feet = np.asarray(group)[shares[t]]
+            _divide(int(t), own_feet, priors, wrench, errors, places, plates, gain_errors, white)
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -149,6 +149,7 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
         effects=effects.reshape(frames, 6, 6 * K),
         contact=np.column_stack([contact, residual]).astype(np.uint8),
         known=~undeclared & ((contact != NO_CONTACT).any(axis=1) | (residual != NO_CONTACT)),
+        noise=None if plates.noise is None else np.where((contact == ON_PLATE)[..., None, None], white, 0.0),
     )
 
 
@@ -172,10 +173,10 @@ def plate_covariances(
     push, pressure = np.maximum(np.abs(wrench[:, 1]), LOADED_N), contact.copy()
     at = pressed_at(wrench, contact[:, 1])
     pressure[:, [0, 2]] = np.where(np.isnan(at), contact[:, [0, 2]], at)
-    shear = np.hypot(np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), off.shear_sd(wrench))
+    shear = np.hypot(np.hypot(NOISE_N, PLATE_TURN_RAD * push), off.shear_sd(wrench))
     shear = np.hypot(shear, gain_error * np.hypot(wrench[:, 0], wrench[:, 2]))
-    lift = np.hypot(PLATE_NOISE_N, np.hypot(PLATE_GAIN, gain_error) * push)
-    moment = np.hypot(PLATE_NOISE_NM, np.hypot(PLATE_PLACE_M, SENSOR_M * gain_error) * push)
+    lift = np.hypot(NOISE_N, np.hypot(PLATE_GAIN, gain_error) * push)
+    moment = np.hypot(NOISE_NM, np.hypot(PLATE_PLACE_M, SENSOR_M * gain_error) * push)
     twist = shear if off.unmeasured else moment
     return _about(pressure, np.stack([shear, lift, shear, moment, twist, moment], axis=1))
 
@@ -246,11 +247,13 @@ def _divide(
     places: Array,
     plates: PlateErrors,
     gain_errors: Array,
+    white: Array,
 ) -> None:
     """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
     first = feet[:1]
     plate = plate_covariances(wrench[t, feet].sum(axis=0)[None], places[t, first], plates, gain_errors[t, first])[0]
+    plate += white[t, feet[0]]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
     root = np.linalg.cholesky(S)
