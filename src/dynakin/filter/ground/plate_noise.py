@@ -7,57 +7,88 @@ of theirs than they have below the cut-off.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections import deque
 from math import comb
+from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from dynakin.arrays import Array, wrench_about
+from dynakin.arrays import Array, Flags, wrench_about
 from dynakin.filter.contacts import carry
-from dynakin.filter.ground.plate_errors import NOISE_N, NOISE_NM, PlateErrors
+from dynakin.filter.ground.plate_errors import NOISE_N, NOISE_NM
 from dynakin.recordings.plates.pressure import pressed_at
-from dynakin.recordings.recording import Plate
 
 ORDER = 6
 """Of the differences: at 100 Hz they keep 0.2 % of what changes at 10 Hz, 9 % at 20 Hz."""
 LEAST = 20
 """Differences, of frames that are loaded throughout, from which on a plate's noise is known."""
+SIGMAS = 2.0
+"""By how many of its own deviations a plate's noise must be more than usual to count: `truth3d`'s plates, whose noise
+is 0.5 to 2 N, are found to have up to 2.6 N in a single stance."""
+LAST, EVERY = 256, 32
+"""Live, so many samples are looked at, so often: it takes 0.3 ms a plate."""
 _WEIGHTS = np.array([(-1.0) ** k * comb(ORDER, k) for k in range(ORDER + 1)])
 _WEIGHTS /= np.linalg.norm(_WEIGHTS)  # white noise keeps its deviation
 _MAD = 0.6745  # median of the size of normal numbers, over their deviation
+_UNSURE = 1.47  # 1.17 / sqrt(2) of independent ones (Rousseeuw & Croux 1993); differences are alike: sqrt(3.17) times
 
 
-def noise_sd(wrench: Array) -> tuple[Array, Array] | None:
-    """Deviations (6,) N and N m of a plate's white noise in each frame, and the point (3,) m about which the moment is
-    meant, the middle of where it is pressed; None where too few frames are loaded.
+class PlateNoise(NamedTuple):
+    """Of a plate: standard deviations (6,) N and N m of its white noise in each frame, the point (3,) m about which the
+    moment is meant, the middle of where it is pressed, and the part by which the deviations may be off (one of
+    theirs)."""
 
-    Args:
-        wrench: (T, 6) about the ground's origin, ground frame; NaN where it is not measured.
-    """
+    sd: Array
+    at: Array
+    unsure: float
+
+
+def plate_noise(wrench: Array) -> PlateNoise | None:
+    """White noise of a plate's wrench (T, 6) about the ground's origin, ground frame, NaN where it is not measured;
+    None where too few frames are loaded."""
     pressed = pressed_at(wrench)
-    loaded = np.isfinite(wrench).all(axis=1) & np.isfinite(pressed).all(axis=1)
+    loaded: Flags = np.asarray(np.isfinite(wrench).all(axis=1) & np.isfinite(pressed).all(axis=1))
     count = len(wrench) - ORDER
     if count < LEAST:
         return None
-    throughout = np.all([loaded[k : k + count] for k in range(ORDER + 1)], axis=0)
+    throughout: Flags = np.asarray(sliding_window_view(loaded, ORDER + 1).all(axis=1))
     if np.count_nonzero(throughout) < LEAST:
         return None
     x, z = np.median(pressed[loaded], axis=0)
     at = np.array([x, 0.0, z])
     about = wrench_about(wrench, at)
-    left = sum(weight * about[k : k + count] for k, weight in enumerate(_WEIGHTS))
-    return np.asarray(np.median(np.abs(left[throughout]), axis=0) / _MAD), at
+    left = np.tensordot(sliding_window_view(about, ORDER + 1, axis=0), _WEIGHTS, axes=1)
+    sd = np.median(np.abs(left[throughout]), axis=0) / _MAD
+    return PlateNoise(np.asarray(sd), at, _UNSURE / float(np.sqrt(np.count_nonzero(throughout))))
 
 
-def with_noise(errors: PlateErrors, plates: Sequence[Plate], wrenches: Array) -> PlateErrors:
-    """The same with the white noise of plates whose wrenches (P, T, 6) show more of it than the usual ones have."""
+def beyond_usual(wrenches: Array) -> Array | None:
+    """(P, 6, 6) covariances about the ground's origin of the white noise that plates of wrenches (P, T, 6) have beyond
+    the usual; None where none has more."""
     usual = np.array([NOISE_N] * 3 + [NOISE_NM] * 3)
-    noise = np.zeros((len(plates), 6, 6))
+    noise = np.zeros((len(wrenches), 6, 6))
     for p, wrench in enumerate(wrenches):
-        if (found := noise_sd(wrench)) is None:
+        if (found := plate_noise(wrench)) is None:
             continue
-        sd, at = found
-        X = carry(at)
-        noise[p] = (X * np.maximum(sd**2 - usual**2, 0.0)) @ X.T
-    return replace(errors, noise=noise) if noise.any() else errors
+        more = found.sd > (1.0 + SIGMAS * found.unsure) * usual
+        X = carry(found.at)
+        noise[p] = (X * np.where(more, found.sd**2 - usual**2, 0.0)) @ X.T
+    return noise if noise.any() else None
+
+
+class LiveNoise:
+    """The same of plates live, by their last samples."""
+
+    def __init__(self) -> None:
+        self._found: Array | None = None
+        self._last: deque[Array] = deque(maxlen=LAST)
+        self._samples = 0
+
+    def look(self, wrenches: Array) -> Array | None:
+        """As `beyond_usual`, with these wrenches (P, 6), ground frame, NaN where one is not measured."""
+        self._last.append(wrenches)
+        self._samples += 1
+        if self._samples % EVERY == 0:
+            self._found = beyond_usual(np.stack(self._last, axis=1))
+        return self._found

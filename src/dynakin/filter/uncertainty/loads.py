@@ -49,7 +49,8 @@ class PlateNoise:
         if frame.noise is None or not frame.noise.any():
             return np.zeros(self._geometry.count)
         units = np.eye(len(frame.noise)).reshape(len(frame.noise), -1, 6)
-        by_each = [self._geometry.moments_by(frame.x, self._geometry.external(unit, frame.segments)) for unit in units]
+        segments = frame.segments[: units.shape[1]]
+        by_each = [self._geometry.moments_by(frame.x, self._geometry.external(unit, segments)) for unit in units]
         J = np.array(by_each)
         return np.asarray(np.maximum((J * (frame.noise @ J)).sum(axis=0), 0.0))
 
