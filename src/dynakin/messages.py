@@ -23,6 +23,7 @@ Topic = Literal[
     "weight",  # plates beside the mass
     "zero",  # plates that read something with nobody on them, or push sideways all the time
     "gain",  # plates whose forces are too large or small
+    "plate noise",  # plates with more noise than plates have
     "vertical only",  # plates that measure no horizontal force
     "carried",  # what is in the hands
     "marker set",  # which one was chosen

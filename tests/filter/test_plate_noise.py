@@ -13,10 +13,12 @@ import scipy.signal
 from dynakin import Estimate
 from dynakin.arrays import Array, wrench_about
 from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.ground.delay import Delay, brought_into_step, noise_in_step
 from dynakin.filter.ground.plate_errors import NOISE_N, NOISE_NM
-from dynakin.filter.ground.plate_noise import EVERY, LiveNoise, beyond_usual, plate_noise
+from dynakin.filter.ground.plate_noise import EVERY, LOUD, LiveNoise, found_noise, plate_noise
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import Sample
+from dynakin.messages import about
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.recording import Plate, Recording
 from support.plates import person, prepared, trial, with_plate
@@ -36,9 +38,19 @@ def noisy(force_n: float, moment_nm: float, seed: int) -> Callable[[Plate], Plat
     return of
 
 
+def moved(plate: Plate, frames: int) -> Plate:
+    """What it says so many frames later."""
+    at = np.maximum(np.arange(len(plate.force)) - frames, 0)
+    return plate.frames(at)
+
+
 @cache
 def with_noise(motion: str, force_n: float, moment_nm: float) -> Recording:
     return with_plate(trial(motion), None, noisy(force_n, moment_nm, 3))
+
+
+def beyond_usual(wrenches: Array) -> Array | None:
+    return found_noise(wrenches, [f"plate {p + 1}" for p in range(len(wrenches))]).noise
 
 
 def wrenches(ready: Prepared) -> Array:
@@ -54,6 +66,14 @@ def test_usual_plates_have_no_more_noise_than_usual(motion: str) -> None:
     assert ready.measured.contacts is not None and ready.measured.contacts.noise_left() is None
 
 
+def test_a_plate_with_far_more_noise_than_plates_have_is_named() -> None:
+    """That of the other, and as much as deviations hold without a word, is not."""
+    (said,) = about(person().prepare(with_plate(trial("squat"), 1, noisy(12.0, 1.0, 5))).messages, "plate noise")
+    assert said.level == "warning" and said.text.startswith("plate 2 has white noise of up to 1") and LOUD == 4.0
+    ready = person().prepare(with_plate(trial("squat"), 1, noisy(5.0, 1.0, 5)))
+    assert not about(ready.messages, "plate noise") and ready.ground.errors.noise is not None
+
+
 @pytest.mark.parametrize("motion", ["gait", "squat"])
 def test_noise_is_found_as_large_as_it_is(motion: str) -> None:
     """And how surely: a single stance shows a fifth too much or too little of it."""
@@ -63,6 +83,29 @@ def test_noise_is_found_as_large_as_it_is(motion: str) -> None:
     off = np.array([(each.sd / ([8.0] * 3 + [1.6] * 3) - 1.0) / each.unsure for each in found])
     assert np.abs(off).max() < 3.0 and np.sqrt(np.mean(off**2)) < 1.5
     assert max(each.unsure for each in found) < 0.25
+
+
+@pytest.mark.parametrize(("late_s", "left"), [(0.0, 1.0), (0.0025, 0.625), (0.005, 0.5), (0.01, 1.0), (0.0325, 0.625)])
+def test_noise_between_two_samples_is_a_mean_of_both(late_s: float, left: float) -> None:
+    """Plates that are brought into step hide their noise from differences (a tenth of it is left at half a sample)."""
+    recording = with_noise("squat", 8.0, 1.6)
+    delay = Delay(late_s, 1e-4)
+    assert delay.worth_it(whole=True) == (late_s > 0.0)
+    np.testing.assert_allclose(noise_in_step(recording, delay), left, rtol=1e-9)
+    quiet = brought_into_step(trial("squat"), delay)
+    for plate, usual in zip(brought_into_step(recording, delay).plates, quiet.plates, strict=True):
+        off = (plate.force - usual.force)[100:-100]
+        assert np.mean(off**2) == pytest.approx(64.0 * left, rel=0.1)
+
+
+def test_noise_of_plates_out_of_step_is_that_before_they_are_brought_into_it() -> None:
+    late = with_plate(with_noise("squat", 8.0, 1.6), None, lambda plate: moved(plate, 2))
+    ready, in_time = person().prepare(late), person().prepare(with_noise("squat", 8.0, 1.6))
+    assert ready.ground.behind_s > 0.01
+    found, expected = ready.ground.errors.noise, in_time.ground.errors.noise
+    assert found is not None and expected is not None
+    ratio = np.diagonal(found, axis1=1, axis2=2)[:, :3] / np.diagonal(expected, axis1=1, axis2=2)[:, :3]
+    assert ((ratio > 0.45) & (ratio < 1.15)).all()
 
 
 def test_noise_of_a_plate_that_was_low_passed_is_not_seen() -> None:
@@ -180,15 +223,15 @@ def test_noise_is_taken_for_noise_by_the_filter() -> None:
 
 def test_live_noise_is_that_of_the_last_samples() -> None:
     ready = person().prepare(with_noise("squat", 8.0, 1.6))
-    all_of_it, live = wrenches(ready), LiveNoise()
-    found = [live.look(all_of_it[:, t]) for t in range(8 * EVERY)]
+    all_of_it, live = wrenches(ready), LiveNoise(["a", "b"])
+    found = [live.look(all_of_it[:, t]).noise for t in range(8 * EVERY)]
     assert found[EVERY - 2] is None
     expected = beyond_usual(all_of_it[:, : 8 * EVERY])
     assert expected is not None and found[-1] is not None
     np.testing.assert_array_equal(found[-1], expected)
     usual = prepared("squat")
-    live = LiveNoise()
-    assert all(live.look(wrench) is None for wrench in wrenches(usual).swapaxes(0, 1)[: 8 * EVERY])
+    live = LiveNoise(["a", "b"])
+    assert all(live.look(wrench).noise is None for wrench in wrenches(usual).swapaxes(0, 1)[: 8 * EVERY])
 
 
 def test_deviations_of_a_session_hold_noise() -> None:

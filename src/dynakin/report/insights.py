@@ -22,7 +22,7 @@ def in_short(found: list[Insight]) -> str:
 OF_FORCES: frozenset[Topic] = frozenset(
     {
         *("weight", "mass", "height", "sex", "carried"),
-        *("plates", "sum of the plates", "in step", "rate", "place", "zero", "gain", "vertical only"),
+        *("plates", "sum of the plates", "in step", "rate", "place", "zero", "gain", "plate noise", "vertical only"),
     }
 )
 """Topics of warnings after which a trial's forces, or the mass that they are compared with, may be wrong."""

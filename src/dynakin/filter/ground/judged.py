@@ -26,7 +26,6 @@ from dynakin.filter.ground.gain import fitting_rate, found_gains, wrong_rate_in_
 from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.on_ground import OnGround
 from dynakin.filter.ground.plate_errors import NO_ERRORS, VERTICAL_ONLY, PlateErrors
-from dynakin.filter.ground.plate_noise import beyond_usual
 from dynakin.filter.ground.plate_sum import Carried, doubtful_mass, judged_by_motion
 from dynakin.filter.ground.shear import found_shear, not_zeroed
 from dynakin.messages import Message, about, note, warning
@@ -88,7 +87,7 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
         all_of_it = on.all_of_it
         first = judged_by_motion(on, [all_of_it], None) if on.unmeasured else None
         errors = _plate_errors(on, loads, first)
-        errors = replace(errors, noise=beyond_usual(trial.wrenches))
+        errors = replace(errors, noise=trial.noise.noise, said=(*errors.said, *trial.noise.said))
         notes += errors.said
         righted = errors.righted(wrench, trial.wrenches)
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)

@@ -8,6 +8,7 @@ of theirs than they have below the cut-off.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from math import comb
 from typing import NamedTuple
 
@@ -16,7 +17,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from dynakin.arrays import Array, Flags, wrench_about
 from dynakin.filter.contacts import carry
-from dynakin.filter.ground.plate_errors import NOISE_N, NOISE_NM
+from dynakin.filter.ground.plate_errors import NO_ERRORS, NOISE_N, NOISE_NM, PlateErrors
+from dynakin.messages import Message, warning
 from dynakin.recordings.plates.pressure import pressed_at
 
 ORDER = 6
@@ -26,6 +28,9 @@ LEAST = 20
 SIGMAS = 2.0
 """By how many of its own deviations a plate's noise must be more than usual to count: `truth3d`'s plates, whose noise
 is 0.5 to 2 N, are found to have up to 2.6 N in a single stance."""
+USUAL = np.array([NOISE_N] * 3 + [NOISE_NM] * 3)
+LOUD = 4.0
+"""Times the usual noise from which it is said."""
 LAST, EVERY = 256, 32
 """Live, so many samples are looked at, so often: it takes 0.3 ms a plate."""
 _WEIGHTS = np.array([(-1.0) ** k * comb(ORDER, k) for k in range(ORDER + 1)])
@@ -63,32 +68,44 @@ def plate_noise(wrench: Array) -> PlateNoise | None:
     return PlateNoise(np.asarray(sd), at, _UNSURE / float(np.sqrt(np.count_nonzero(throughout))))
 
 
-def beyond_usual(wrenches: Array) -> Array | None:
-    """(P, 6, 6) covariances about the ground's origin of the white noise that plates of wrenches (P, T, 6) have beyond
-    the usual; None where none has more."""
-    usual = np.array([NOISE_N] * 3 + [NOISE_NM] * 3)
-    noise = np.zeros((len(wrenches), 6, 6))
-    for p, wrench in enumerate(wrenches):
+def found_noise(wrenches: Array, names: Sequence[str]) -> PlateErrors:
+    """White noise beyond the usual of plates with these wrenches (P, T, 6), as in `plate_noise`."""
+    noise, said = np.zeros((len(wrenches), 6, 6)), list[Message]()
+    for p, (name, wrench) in enumerate(zip(names, wrenches, strict=True)):
         if (found := plate_noise(wrench)) is None:
             continue
-        more = found.sd > (1.0 + SIGMAS * found.unsure) * usual
+        more = found.sd > (1.0 + SIGMAS * found.unsure) * USUAL
         X = carry(found.at)
-        noise[p] = (X * np.where(more, found.sd**2 - usual**2, 0.0)) @ X.T
-    return noise if noise.any() else None
+        noise[p] = (X * np.where(more, found.sd**2 - USUAL**2, 0.0)) @ X.T
+        if (more & (found.sd > LOUD * USUAL)).any():
+            said.append(warning("plate noise", _in_words(name, found.sd)))
+    return PlateErrors(noise=noise if noise.any() else None, said=tuple(said))
+
+
+def _in_words(name: str, sd: Array) -> str:
+    return (
+        f"{name} has white noise of up to {sd[:3].max():.2g} N and {sd[3:].max():.2g} N m in each frame (standard "
+        f"deviation; usual plates {NOISE_N:g} N, {NOISE_NM:g} N m): moments of the legs and the feet's forces follow "
+        "most of it, and their deviations hold it."
+    )
 
 
 class LiveNoise:
-    """The same of plates live, by their last samples."""
+    """The same of plates live, by their last samples.
 
-    def __init__(self) -> None:
-        self._found: Array | None = None
+    Args:
+        names: of the P plates.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names, self._found = names, NO_ERRORS
         self._last: deque[Array] = deque(maxlen=LAST)
         self._samples = 0
 
-    def look(self, wrenches: Array) -> Array | None:
-        """As `beyond_usual`, with these wrenches (P, 6), ground frame, NaN where one is not measured."""
+    def look(self, wrenches: Array) -> PlateErrors:
+        """With these wrenches (P, 6), ground frame, NaN where one is not measured."""
         self._last.append(wrenches)
         self._samples += 1
         if self._samples % EVERY == 0:
-            self._found = beyond_usual(np.stack(self._last, axis=1))
+            self._found = found_noise(np.stack(self._last, axis=1), self._names)
         return self._found

@@ -87,7 +87,7 @@ class LiveFeet:
         contacts = [p for p, name in given.items() if name in self.initial.contacts]
         assigned_feet = {p: self.feet.index(name) for p, name in given.items() if name in self.feet}
         self._given = {p: (given[p],) for p in contacts}
-        self._noise = LiveNoise()
+        self._noise = LiveNoise(plates)
         self._owners = PlateOwners(len(self.feet), len(plates), assigned_feet, contacts)
         self._range = EndOfRange(len(plates))
 
@@ -141,7 +141,7 @@ class LiveFeet:
         errors = PlateErrors(unmeasured=True) if self._vertical else NO_ERRORS
         if wrenches is None:
             return errors
-        return replace(errors, noise=self._noise.look(self.initial.ground.wrench_to_ground(wrenches)))
+        return replace(errors, noise=self._noise.look(self.initial.ground.wrench_to_ground(wrenches)).noise)
 
     def _closed(
         self, loads: FootLoads, time_s: float, markers: Array, places: Array, wrenches: Array, bears: Flags

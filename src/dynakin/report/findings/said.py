@@ -107,6 +107,12 @@ _KINDS = (
         "forces; if by the film something else bears the person there, declare it (--contact).",
     ),
     _Kind(
+        "Plates' noise",
+        ("plate noise",),
+        "Look for what disturbs or shakes these plates (a loose plug, a missing ground, a belt's motor) before the "
+        "next trial; of this one use means over repetitions.",
+    ),
+    _Kind(
         "Plates' horizontal forces",
         ("vertical only",),
         "Export the horizontal forces as well, or record with plates that measure them.",
