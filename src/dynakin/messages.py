@@ -24,6 +24,7 @@ Topic = Literal[
     "zero",  # plates that read something with nobody on them, or push sideways all the time
     "gain",  # plates whose forces are too large or small
     "free moment",  # plates whose moment about the vertical is off what the motion needs
+    "plate noise",  # plates with more noise than plates have
     "vertical only",  # plates that measure no horizontal force
     "carried",  # what is in the hands
     "marker set",  # which one was chosen

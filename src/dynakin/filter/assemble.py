@@ -127,7 +127,8 @@ def assemble(
     }
     events = events_of(whole, parameters, initial, limit_sd(used, used.unseen_sd))  # by what the filter itself believes
     if systematic is not None:
-        data = systematic.added_over_time(data, late=bool(config.get("lag_s")))
+        left = None if feet is None else feet.noise_left()
+        data = systematic.added_over_time(data, late=bool(config.get("lag_s")), noise=left)
     if low_pass is not None:
         data, said = with_taken(data, low_pass, systematic)
         notes = [*notes, said]

@@ -33,6 +33,8 @@ class ContactLoads:
         contact: (T, C) NO_CONTACT, ON_PLATE, UNMEASURED or SHARED_PLATE.
         known: (T,) frames in which these contacts are all that acts on the person: in others the filter takes nothing
             from their sum.
+        noise: (T, K, 6, 6) the part of the covariances of the first K contacts that is white noise of their own plates
+            beyond the usual (`filter.ground.plate_noise`); None: none is.
     """
 
     names: tuple[str, ...]
@@ -42,6 +44,7 @@ class ContactLoads:
     effects: Array
     contact: Codes
     known: Flags
+    noise: Array | None = None
 
     @classmethod
     def of(
@@ -157,6 +160,22 @@ class ContactLoads:
         )
         return np.sqrt(np.diagonal(plates.total()[1], axis1=1, axis2=2))
 
+    def noise_left(self) -> Array | None:
+        """(T, 6 K, 6 K) what of `noise` is left in the wrenches of these contacts: all of it, but for what each takes
+        of what the sum lacks (docs/derivations.md, section 15). None where there is none."""
+        if self.noise is None:
+            return None
+        touches, (frames, count) = self.contact != NO_CONTACT, self.contact.shape
+        both = touches[:, :, None, None, None] & touches[:, None, None, :, None]
+        with_sum = np.where(both, self.covariance.reshape(frames, count, 6, count, 6), 0.0).sum(axis=3)
+        total = with_sum.sum(axis=1)
+        total[~touches.any(axis=1)] = np.eye(6)
+        K = self.noise.shape[1]
+        own = with_sum[:, :K].reshape(frames, 6 * K, 6)
+        share = np.swapaxes(np.linalg.solve(total, np.swapaxes(own, 1, 2)), 1, 2)
+        left = np.eye(6 * K) - np.tile(share, (1, 1, K))
+        return np.asarray(left @ _joint(self.noise) @ np.swapaxes(left, 1, 2))
+
     def weighed(self, variance_scale: float) -> ContactLoads:
         """With the errors of frames in which feet bear and no plate measures anything on the scale of all other noise
         (`Noise.variance_scale`): what is left there, priors and what the model does not explain, is weighed against the
@@ -169,7 +188,8 @@ class ContactLoads:
     def first(self, frames: int) -> ContactLoads:
         """Those of the first frames."""
         names = ("wrench", "covariance", "effects", "contact", "known")
-        return replace(self, **{name: getattr(self, name)[:frames] for name in names})
+        noise = None if self.noise is None else self.noise[:frames]
+        return replace(self, **{name: getattr(self, name)[:frames] for name in names}, noise=noise)
 
     def in_step(self, time: Array, delay_s: float) -> ContactLoads:
         """What belongs to each time (T,) s where the plates lag by ``delay_s``; contacts and priors by the nearest
@@ -188,6 +208,7 @@ class ContactLoads:
             effects=self.effects[nearest],
             contact=contact,
             known=self.known[nearest],
+            noise=None if self.noise is None else self.noise[nearest],
         )
 
 

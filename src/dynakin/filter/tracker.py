@@ -193,8 +193,10 @@ class Tracker:
         plates_sd = None if feet is None or plates_refused or not feet.by_plates[0] else feet.plates_sd()[0]
         self._steps.off_plates |= feet is not None and stands_off_plates(feet.contact, len(self.calibrated.feet))
         segments = () if feet is None else feet.segments
+        noise = None if feet is None else feet.noise_left()
+        left = None if noise is None else noise[0]
         used = self._sight.used
-        step = Stepped(sample.time_s, loads, sources, segments, unmeasured, blind, plates_sd, unseen, used)
+        step = Stepped(sample.time_s, loads, sources, segments, unmeasured, blind, plates_sd, left, unseen, used)
         self._steps.add(step)
         self._latest = self._estimate(step, sample.time_s, self.state, report)
         if self._look_ahead is not None:

@@ -22,7 +22,8 @@ def in_short(found: list[Insight]) -> str:
 OF_FORCES: frozenset[Topic] = frozenset(
     {
         *("weight", "mass", "height", "sex", "carried"),
-        *("plates", "sum of the plates", "in step", "rate", "place", "zero", "gain", "free moment", "vertical only"),
+        *("plates", "sum of the plates", "in step", "rate", "place", "zero", "gain", "free moment", "plate noise"),
+        "vertical only",
     }
 )
 """Topics of warnings after which a trial's forces, or the mass that they are compared with, may be wrong."""

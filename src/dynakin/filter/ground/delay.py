@@ -97,6 +97,16 @@ def brought_into_step(recording: Recording, delay: Delay) -> Recording:
     return recording.with_plates(tuple(map(of, recording.plates, delay.apart or [0.0] * len(recording.plates))))
 
 
+def noise_in_step(recording: Recording, delay: Delay) -> Array:
+    """(P,) by which the variance of white noise is less in plates that were brought into step: what is said between two
+    samples is a mean of both."""
+    if not delay.worth_it(whole=True):
+        return np.ones(len(recording.plates))
+    lags = delay.lags(recording.time) if delay.drift else np.array([delay.delay_s])
+    between = np.mod((lags + np.reshape(delay.apart or [0.0] * len(recording.plates), (-1, 1))) * recording.rate, 1.0)
+    return np.asarray(np.mean(1.0 - 2.0 * between * (1.0 - between), axis=1))
+
+
 def later(time: Array, values: Array, delay_s: float | Array) -> Array:
     """`in_step` of values (T, 3), but NaN farther than `HELD_S` beyond the recording."""
     then = time + delay_s

@@ -19,7 +19,7 @@ from dynakin.arrays import Array, Flags, filled, mean_seen
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
 from dynakin.filter.ground.gain import SENSOR_M
 from dynakin.filter.ground.ground import Ground
-from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
+from dynakin.filter.ground.plate_errors import NO_ERRORS, NOISE_N, NOISE_NM, PlateErrors
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
@@ -30,8 +30,6 @@ from dynakin.settings.contacts import SEAT
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
 
-PLATE_NOISE_N, PLATE_NOISE_NM = 2.0, 0.5
-"""White noise of the usual plates, the moment about the centre of pressure."""
 PLATE_GAIN, PLATE_TURN_RAD, PLATE_PLACE_M = 0.01, 0.005, 0.002
 """Errors that grow with the load: of a plate's gain, how it lies turned, and where it lies."""
 PUSH_SD, PUSH_LEAST_SD = 0.4, 0.05
@@ -118,7 +116,8 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
     by_plates = plate_covariances(
         wrench[:, :K].reshape(-1, 6), places.reshape(-1, 3), plates, gain_errors.reshape(-1), turn_errors.reshape(-1)
     )
-    errors[:, each, :, each] = by_plates.reshape(frames, K, 6, 6).swapaxes(0, 1)
+    white = plates.noise_of(loads, list(initial.contacts))
+    errors[:, each, :, each] = (by_plates.reshape(frames, K, 6, 6) + white).swapaxes(0, 1)
     for k in range(K):
         off = unmeasured[:, k]
         if not (off | (contact[:, k] == SHARED_PLATE)).any():
@@ -148,7 +147,7 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
                 gain_errors[t, feet_on[:1]],
                 turn_errors[t, feet_on[:1]],
             )
-            _divide(int(t), feet_on, priors, wrench, errors, plate[0])
+            _divide(int(t), feet_on, priors, wrench, errors, plate[0] + white[t, feet_on[0]])
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -161,6 +160,7 @@ def expected_loads(ground: Ground, initial: CalibratedModel, noise: Noise, paths
         effects=effects.reshape(frames, 6, 6 * K),
         contact=np.column_stack([contact, residual]).astype(np.uint8),
         known=~undeclared & ((contact != NO_CONTACT).any(axis=1) | (residual != NO_CONTACT)),
+        noise=None if plates.noise is None else np.where((contact == ON_PLATE)[..., None, None], white, 0.0),
     )
 
 
@@ -189,10 +189,10 @@ def plate_covariances(
     push, pressure = np.maximum(np.abs(wrench[:, 1]), LOADED_N), contact.copy()
     at = pressed_at(wrench, contact[:, 1])
     pressure[:, [0, 2]] = np.where(np.isnan(at), contact[:, [0, 2]], at)
-    shear = np.hypot(np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), off.shear_sd(wrench))
+    shear = np.hypot(np.hypot(NOISE_N, PLATE_TURN_RAD * push), off.shear_sd(wrench))
     shear = np.hypot(shear, gain_error * np.hypot(wrench[:, 0], wrench[:, 2]))
-    lift = np.hypot(PLATE_NOISE_N, np.hypot(PLATE_GAIN, gain_error) * push)
-    moment = np.hypot(PLATE_NOISE_NM, np.hypot(PLATE_PLACE_M, SENSOR_M * gain_error) * push)
+    lift = np.hypot(NOISE_N, np.hypot(PLATE_GAIN, gain_error) * push)
+    moment = np.hypot(NOISE_NM, np.hypot(PLATE_PLACE_M, SENSOR_M * gain_error) * push)
     turning = np.hypot(turn_error_nm, off.turn_gain_error * free_moments(wrench))
     twist = shear if off.unmeasured else np.hypot(moment, turning)
     return _about(pressure, np.stack([shear, lift, shear, moment, twist, moment], axis=1))

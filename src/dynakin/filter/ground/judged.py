@@ -87,6 +87,7 @@ def _by_motion(on: OnGround, check: PlateCheck) -> tuple[Ground, Array]:
         all_of_it = on.all_of_it
         first = judged_by_motion(on, [all_of_it], None) if on.unmeasured else None
         errors = _plate_errors(on, loads, first)
+        errors = replace(errors, noise=trial.noise.noise, said=(*errors.said, *trial.noise.said))
         notes += errors.said
         righted = errors.righted(wrench, trial.wrenches)
     turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)

@@ -62,6 +62,7 @@ def known_ground(
         RecordingError: the plates are refused.
     """
     trial, zeros = _zeroed(GroundTrial(recording, Needed(initial, recording.time, markers), assigned, tolerance))
+    trial = trial.with_noise()
     as_it_is = OnGround.of(trial)
     coarse = as_it_is.coarse_delay()
     on_ground = as_it_is if coarse is None else OnGround.of(trial.in_step(coarse))

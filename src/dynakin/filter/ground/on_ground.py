@@ -12,9 +12,10 @@ from dynakin.arrays import Array, Flags
 from dynakin.errors import RecordingError
 from dynakin.filter.ground.axes import turned_axes
 from dynakin.filter.ground.declared import declared_contacts, plates_of_their_own
-from dynakin.filter.ground.delay import Delay, brought_into_step, plates_delay
+from dynakin.filter.ground.delay import Delay, brought_into_step, noise_in_step, plates_delay
 from dynakin.filter.ground.needed import Needed
 from dynakin.filter.ground.plate_errors import NO_ERRORS, PlateErrors
+from dynakin.filter.ground.plate_noise import found_noise
 from dynakin.filter.samples import total_wrench
 from dynakin.messages import note
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -33,12 +34,14 @@ _CORRECT_MOMENTS = (
 
 @dataclass(frozen=True, eq=False)
 class GroundTrial:
-    """What is judged: a recording's plates by its motion; assigned, tolerance: as for `known_ground`."""
+    """What is judged: a recording's plates by its motion; assigned, tolerance: as for `known_ground`; noise: of the
+    plates, as it was before they were brought into step, which hides it (`found_noise`)."""
 
     recording: Recording
     needed: Needed
     assigned: Mapping[str, str] | None
     tolerance: float | None
+    noise: PlateErrors = NO_ERRORS
 
     @property
     def initial(self) -> CalibratedModel:
@@ -57,11 +60,21 @@ class GroundTrial:
 
     def in_step(self, delay: Delay) -> GroundTrial:
         """The same of what the plates say so much later."""
-        return replace(self, recording=brought_into_step(self.recording, delay))
+        white = self.noise.noise
+        if white is not None:
+            white = noise_in_step(self.recording, delay)[:, None, None] * white
+        noise = replace(self.noise, noise=white)
+        return replace(self, recording=brought_into_step(self.recording, delay), noise=noise)
+
+    def with_noise(self) -> GroundTrial:
+        """The same with the noise that these plates show."""
+        if not self.recording.plates:
+            return self
+        return replace(self, noise=found_noise(self.wrenches, [plate.name for plate in self.recording.plates]))
 
     def without_plates(self) -> GroundTrial:
         """The same of the markers alone."""
-        return replace(self, recording=self.recording.with_plates(()), assigned=None)
+        return replace(self, recording=self.recording.with_plates(()), assigned=None, noise=NO_ERRORS)
 
 
 @dataclass(frozen=True, eq=False)

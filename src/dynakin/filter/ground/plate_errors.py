@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ from dynakin.arrays import Array, Flags
 from dynakin.messages import Message, warning
 from dynakin.recordings.feet.loads import FootLoads
 
+NOISE_N, NOISE_NM = 2.0, 0.5
+"""White noise of the usual plates, the moment about the centre of pressure."""
 ANY_N = 1e4
 """Deviation, N (N m of the moment about the vertical), of what is not measured: any that a person makes, and little
 enough to be inverted beside a plate's noise."""
@@ -26,6 +29,8 @@ class PlateErrors:
         gain_error: (P,) part of its load by which each plate may be off.
         gain: (P,) what each says over what it should, as far as that is known; 1 of plates of which one is wrong and
             nobody knows which.
+        noise: (P, 6, 6) covariance of each plate's white noise beyond the usual, about the ground's origin
+            (`plate_noise`).
         said: what there is to say, of what looks like such errors, too.
         turn_error_nm: (P,) N m by which the moment about the vertical of each may be off while it is loaded.
         turn_gain_error: part of any free moment by which it may be off, too.
@@ -37,6 +42,7 @@ class PlateErrors:
     unmeasured: bool = False
     gain_error: Array | float = 0.0
     gain: Array | float = 1.0
+    noise: Array | None = None
     said: tuple[Message, ...] = ()
     borne: Flags | bool = False
     turn_error_nm: Array | float = 0.0
@@ -57,6 +63,15 @@ class PlateErrors:
     def turn_error_of_feet(self, loads: FootLoads) -> Array:
         """(T, F) N m by which the moment about the vertical of what each foot stands on may be off."""
         return np.asarray((loads.on * self.turn_error_nm).max(axis=2, initial=0.0))
+
+    def noise_of(self, loads: FootLoads, contacts: Sequence[str]) -> Array:
+        """(T, F + C, 6, 6) of what each foot stands on, and of what measures each declared contact."""
+        on = np.concatenate([loads.on, np.zeros((len(loads.on), len(contacts), loads.on.shape[2]), dtype=bool)], axis=1)
+        if self.noise is None:
+            return np.zeros((*on.shape[:2], 6, 6))
+        for p, names in loads.given.items():
+            on[:, [len(loads.feet) + contacts.index(name) for name in names], p] = True
+        return np.tensordot(on, self.noise, axes=1)
 
     def zeroed(self, wrench: Array) -> Array:
         """The sum over the plates (T, 6) without its zero."""

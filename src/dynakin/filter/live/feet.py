@@ -15,6 +15,7 @@ from dynakin.filter.ground.declared import may_bear
 from dynakin.filter.ground.expected import ContactPaths, expected_loads
 from dynakin.filter.ground.ground import Ground
 from dynakin.filter.ground.plate_errors import NO_ERRORS, VERTICAL_ONLY, PlateErrors
+from dynakin.filter.ground.plate_noise import LiveNoise
 from dynakin.filter.live.closure import DELAY_S, LiveClosure
 from dynakin.filter.live.owners import PlateOwners
 from dynakin.filter.live.stances import DT_S, LiveStances
@@ -86,6 +87,7 @@ class LiveFeet:
         contacts = [p for p, name in given.items() if name in self.initial.contacts]
         assigned_feet = {p: self.feet.index(name) for p, name in given.items() if name in self.feet}
         self._given = {p: (given[p],) for p in contacts}
+        self._noise = LiveNoise(plates)
         self._owners = PlateOwners(len(self.feet), len(plates), assigned_feet, contacts)
         self._range = EndOfRange(len(plates))
 
@@ -129,15 +131,17 @@ class LiveFeet:
         return bool(loads.total_known[0] and not bears.any() and not self._vertical)
 
     def _errors(self, wrenches: Array | None) -> PlateErrors:
-        """Whether the plates measure horizontal forces: noise alone shows that they do."""
+        """Whether the plates measure horizontal forces: noise alone shows that they do; and that noise."""
         if not self._sideways and wrenches is not None:
             force = np.abs(self.initial.ground.wrench_to_ground(wrenches)[:, :3])
             self._sideways = bool((force[:, [0, 2]] > STILL_N * force[:, [1]]).any())
             self._vertical = not self._sideways and bool((force[:, 1] > JUDGED_N).any())
-        if not self._vertical:
-            return NO_ERRORS
-        self._say(sentence(VERTICAL_ONLY.text))
-        return PlateErrors(unmeasured=True)
+        if self._vertical:
+            self._say(sentence(VERTICAL_ONLY.text))
+        errors = PlateErrors(unmeasured=True) if self._vertical else NO_ERRORS
+        if wrenches is None:
+            return errors
+        return replace(errors, noise=self._noise.look(self.initial.ground.wrench_to_ground(wrenches)).noise)
 
     def _closed(
         self, loads: FootLoads, time_s: float, markers: Array, places: Array, wrenches: Array, bears: Flags

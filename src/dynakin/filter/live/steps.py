@@ -23,8 +23,8 @@ from dynakin.settings.noise import Noise
 
 class Stepped(NamedTuple):
     """Of a step: its feet, whose moments are measured, their segments, whether plates miss one of them, or all; (6,)
-    deviations of their sum where plates measure all of it, else None; (C,) coordinates of which nothing is seen; (M,)
-    markers that show the posture."""
+    deviations of their sum where plates measure all of it, else None; noise as of `Frames`, of one; (C,) coordinates of
+    which nothing is seen; (M,) markers that show the posture."""
 
     time_s: float
     loads: _core.ContactLoads | None
@@ -33,6 +33,7 @@ class Stepped(NamedTuple):
     unmeasured: bool
     blind: bool
     plates_sd: Array | None
+    noise: Array | None
     unseen: npt.NDArray[np.bool_]
     used: npt.NDArray[np.bool_]
 
@@ -49,7 +50,7 @@ class Steps:
         self._model, self._noise = model, noise
         count, markers = len(model.coordinate_names), len(model.spec.markers)
         unseen, used = np.zeros(count, dtype=bool), np.ones(markers, dtype=bool)
-        self.last = Stepped(0.0, None, np.zeros(count, np.uint8), (), False, False, None, unseen, used)
+        self.last = Stepped(0.0, None, np.zeros(count, np.uint8), (), False, False, None, None, unseen, used)
         self.off_plates = False
         self._steps: deque[Stepped] = deque(maxlen=lag + 2)
 
@@ -108,6 +109,7 @@ class Steps:
                 off_plates=self.off_plates,
                 late=late,
                 variance_scale=found_noise.variance_scale,
+                noise=None if step.noise is None else step.noise[None],
             )
             found |= {block: values[0] for block, values in systematic.added(frames).items()}
         found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])

@@ -38,6 +38,8 @@ class Frames:
         wrench: (T, F, 6) N and N m, of the contacts on these segments. wrench_rate: (T, F, 6) by how much they change a
             second.
         used: (T, M) markers that show the posture (`in_use`).
+        noise: (T, 6 F, 6 F) covariances of what plates' white noise beyond the usual leaves in the contacts' wrenches
+            (`ContactLoads.noise_left`); None: nothing.
         sources: (T, C) of the moments (`results.measures.sources`), `as_believed` where plates were refused.
         ends: (T,) those `at_the_ends` of a recording, where later or earlier frames are missing.
         off_plates: whether some foot stands off the plates. late: whether later frames helped.
@@ -59,9 +61,12 @@ class Frames:
     off_plates: bool
     late: bool
     variance_scale: float
+    noise: Array | None = None
 
     @classmethod
-    def of(cls, data: xr.Dataset, feet: int, variance_scale: float, *, late: bool) -> Frames:
+    def of(
+        cls, data: xr.Dataset, feet: int, variance_scale: float, *, late: bool, noise: Array | None = None
+    ) -> Frames:
         """Those of a recording.
 
         Args:
@@ -89,12 +94,15 @@ class Frames:
             off_plates=any_off_plates(data, feet),
             late=late,
             variance_scale=variance_scale,
+            noise=noise,
         )
 
     def at(self, k: int, geometry: Geometry) -> Frame:
         """One of them."""
         external, rate = (geometry.external(each[k], self.segments) for each in (self.wrench, self.wrench_rate))
-        return Frame(geometry, self.states[k], external, rate, self.used[k], (self.known_sd[k], self.known))
+        noise = None if self.noise is None else self.noise[k]
+        known = (self.known_sd[k], self.known)
+        return Frame(geometry, self.states[k], external, rate, self.used[k], known, noise, self.segments)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +111,8 @@ class Frame:
 
     Attributes:
         x: (n,) state. external: (S, 6) wrenches on the segments, about the ground's origin. external_rate: (S, 6) by
-            how much they change a second. used: (M,), known: (n,) and (n, n) as of `Frames`; not given: all markers.
+            how much they change a second. used: (M,), known: (n,) and (n, n), noise: (6 F, 6 F), segments: as of
+            `Frames`; not given: all markers, no noise.
     """
 
     geometry: Geometry
@@ -112,6 +121,8 @@ class Frame:
     external_rate: Array
     used: Flags | None
     known: tuple[Array, Array]
+    noise: Array | None = None
+    segments: Sequence[str] = ()
 
     @property
     def motion(self) -> tuple[Array, Array, Array]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.frames import Frame, rates
 from dynakin.filter.uncertainty.geometry import Geometry, Parts
@@ -32,6 +33,26 @@ class Clock:
         """Of moments, in one frame."""
         moments = self._geometry.moments_by(frame.x, frame.external_rate)
         return {"clock": self._geometry.of_moments(np.square(moments))}
+
+
+class PlateNoise:
+    """Kind "plates": white noise of the plates beyond the usual, which the feet's wrenches follow."""
+
+    def __init__(self, geometry: Geometry) -> None:
+        self._geometry = geometry
+
+    def variances(self, frame: Frame) -> Parts:
+        """Of moments, in one frame."""
+        return {"plates": self._geometry.of_moments(self._of_moments(frame))}
+
+    def _of_moments(self, frame: Frame) -> Array:
+        if frame.noise is None or not frame.noise.any():
+            return np.zeros(self._geometry.count)
+        units = np.eye(len(frame.noise)).reshape(len(frame.noise), -1, 6)
+        segments = frame.segments[: units.shape[1]]
+        by_each = [self._geometry.moments_by(frame.x, self._geometry.external(unit, segments)) for unit in units]
+        J = np.array(by_each)
+        return np.asarray(np.maximum((J * (frame.noise @ J)).sum(axis=0), 0.0))
 
 
 class Hands:

@@ -89,5 +89,7 @@ def reported(frames: Frames, sizes: Sizes, parts: Parts, intensity: Array, moved
             variance = variance + size**2 * parts[kind][block]
         if sizes.inertia:  # the filter's own part has so much of it already
             variance = variance + np.maximum(1.0 - factor * frames.variance_scale, 0.0) * parts["inertia"][block]
+        if frames.noise is not None:  # of it, too
+            variance = variance + np.maximum(1.0 - factor, 0.0) * parts["plates"][block]
         found[block] = np.sqrt(variance)
     return found

@@ -19,7 +19,7 @@ from dynakin.arrays import Array
 from dynakin.filter.uncertainty.frames import Frame, Frames
 from dynakin.filter.uncertainty.geometry import BLOCKS, Blocks, Geometry, Parts
 from dynakin.filter.uncertainty.joints import Joints
-from dynakin.filter.uncertainty.loads import Clock, Hands, late_by
+from dynakin.filter.uncertainty.loads import Clock, Hands, PlateNoise, late_by
 from dynakin.filter.uncertainty.mass_centres import Inertia, MassCentres
 from dynakin.filter.uncertainty.reported import movement_intensity, reported
 from dynakin.filter.uncertainty.sizes import KINDS, Sizes, usual_sizes
@@ -61,12 +61,14 @@ class Systematic:
         self.sizes = sizes or usual_sizes(calibrated).scaled(noise.systematic_scale)
         self.geometry = Geometry(calibrated, noise)
         self._clock, self._joints = Clock(self.geometry), Joints(self.geometry, calibrated)
+        self._noise = PlateNoise(self.geometry)
         self._errors: list[Error] = [
             self._joints,
             Skin(self.geometry, calibrated),
             MassCentres(self.geometry, calibrated),
             Hands(self.geometry),
             self._clock,
+            self._noise,
             Inertia(self.geometry, calibrated),
         ]
         self._locked = [c.name for c in spec.coordinates if c.locked and c.name not in calibrated.held]
@@ -99,7 +101,7 @@ class Systematic:
         number."""
         if not np.isfinite(np.concatenate(frame.motion)).all():
             unknown = np.full(self.geometry.count, np.nan)
-            return {kind: dict.fromkeys(BLOCKS, unknown) for kind in (*KINDS, "inertia")}
+            return {kind: dict.fromkeys(BLOCKS, unknown) for kind in (*KINDS, "inertia", "plates")}
         return {kind: blocks for error in self._errors for kind, blocks in error.variances(frame).items()}
 
     def parts(self, frames: Frames) -> Parts:
@@ -112,7 +114,9 @@ class Systematic:
         }
         known = np.flatnonzero(np.isfinite(frames.states).all(axis=1))
         for k in np.setdiff1d(known, chosen):  # a load passes faster
-            found["clock"]["moments"][k] = self._clock.variances(frames.at(k, self.geometry))["clock"]["moments"]
+            frame = frames.at(k, self.geometry)
+            for kind, blocks in (self._clock.variances(frame) | self._noise.variances(frame)).items():
+                found[kind]["moments"][k] = blocks["moments"]
         return found
 
     def added(self, frames: Frames) -> Blocks:
@@ -122,10 +126,10 @@ class Systematic:
         intensity, moved_m = movement_intensity(acceleration, sd), self.moved_m(frames.states)
         return reported(frames, self.sizes, self.parts(frames), intensity, moved_m)
 
-    def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
+    def added_over_time(self, data: xr.Dataset, *, late: bool, noise: Array | None = None) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``, and the plates' clock in
-        those of contacts' wrenches."""
-        sd = self.added(Frames.of(data, self._feet, self._variance_scale, late=late))
+        those of contacts' wrenches; noise: as of `Frames`."""
+        sd = self.added(Frames.of(data, self._feet, self._variance_scale, late=late, noise=noise))
         blocks = {f"{block}_sd": (("time", "coordinate"), sd[block]) for block in BLOCKS}
         return data.assign(blocks | late_by(data, self.sizes.clock))
 

@@ -113,6 +113,12 @@ _KINDS = (
         "their moment about the vertical (Mz) in the file of the forces.",
     ),
     _Kind(
+        "Plates' noise",
+        ("plate noise",),
+        "Look for what disturbs or shakes these plates (a loose plug, a missing ground, a belt's motor) before the "
+        "next trial; of this one use means over repetitions.",
+    ),
+    _Kind(
         "Plates' horizontal forces",
         ("vertical only",),
         "Export the horizontal forces as well, or record with plates that measure them.",
