@@ -80,9 +80,13 @@ class Tracker:
         """Another one, at the start of the same model."""
         return self.changed(self.noise)
 
-    def changed(self, noise: Noise) -> Tracker:
-        """Another one, at the start of the same model with other noise, which asks for the same states."""
-        return Tracker(self.calibrated, noise, self.estimate, self.lag, self.plates, self._assigned)
+    def changed(self, noise: Noise, calibrated: CalibratedModel | None = None) -> Tracker:
+        """Another one, at the start of the same model with other noise, which asks for the same states.
+
+        Args:
+            calibrated: the same model that starts elsewhere or less surely.
+        """
+        return Tracker(calibrated or self.calibrated, noise, self.estimate, self.lag, self.plates, self._assigned)
 
     @property
     def state(self) -> Array:
