@@ -160,7 +160,7 @@ def test_a_joint_with_a_lateral_marker_alone_is_less_sure() -> None:
     assert both.plan is not None and one.plan is not None
     axes = [each.plan.prior(Priors())["length/knee_axis_r"] for each in (both, one)]
     assert axes == pytest.approx([0.05, SUPPOSED_AXIS * 0.05])  # it is laid between pelvis and foot
-    joints = [Joints(Geometry(each, Noise()), each, Noise()) for each in (both, one)]
+    joints = [Joints(Geometry(each, Noise()), each) for each in (both, one)]
     assert [each._times.max() for each in joints] == [1.0, ONE_SIDED]
 
 

@@ -190,9 +190,11 @@ def test_of_smoothed_moments_more_is_unseen_the_further_frames_are_apart(hz: flo
 
 def test_centres_of_joints_are_as_much_less_sure_as_markers_lie_elsewhere_than_a_scaled_model_has_them() -> None:
     none = {kind: dict.fromkeys(BLOCKS, np.zeros((3, 1))) for kind in (*KINDS, "inertia")}
-    centres = none | dict.fromkeys(("hinge_centre", "ball_centre"), dict.fromkeys(BLOCKS, np.ones((3, 1))))
+    kinds = ("hinge_centre", "hinge_across", "ball_centre")
+    centres = none | dict.fromkeys(kinds, dict.fromkeys(BLOCKS, np.ones((3, 1))))
     still, moved_m = dict.fromkeys(BLOCKS, np.zeros((3, 1))), SCALED.placed * np.array([0.5, 1.0, 3.0])
     by_frame = reported_of(still, np.zeros(3), SCALED, centres, moved_m=moved_m, late=True)["moments"][:, 0]
-    np.testing.assert_allclose(by_frame / np.hypot(SCALED.hinge_centre, SCALED.ball_centre), [1.0, 1.0, 3.0])
+    own, of_landmarks = (np.linalg.norm([getattr(sizes, kind) for kind in kinds]) for sizes in (SCALED, LANDMARKS))
+    np.testing.assert_allclose(by_frame / own, [1.0, 1.0, 3.0])
     measured = reported_of(still, np.zeros(3), LANDMARKS, centres, moved_m=np.full(3, 0.1), late=True)["moments"]
-    np.testing.assert_allclose(measured, np.hypot(LANDMARKS.hinge_centre, LANDMARKS.ball_centre))
+    np.testing.assert_allclose(measured, of_landmarks)

@@ -36,8 +36,8 @@ Kind = Literal[
     "root_origin",
 ]
 """The centre of a joint with one or two axes (hinge; elbow: what hangs on a limb of the trunk) off where it is on its
-bones, and besides along its (first) axis; or with three (ball; the spine's) within its parent's sagittal plane and
-across that; its one axis, two or three turned on both bones, or those of what hangs on the trunk and bears
+bones, and besides across its parent's sagittal plane (hinges of limbs); or with three (ball; the spine's) within that
+plane and across it; its one axis, two or three turned on both bones, or those of what hangs on the trunk and bears
 another joint; the root's frame turned in its bone, about its third axis (tilt, the trunk's as well) or another, or its
 origin elsewhere in it."""
 BALLS: tuple[Kind, ...] = ("ball_centre", "ball_across")
@@ -229,9 +229,8 @@ def _sources(
             found.append((hinge if axes < 3 else _centre(k, name in trunks), name, column))
         if not planar:
             if axes < 3 and segment.parent not in arms:
-                found.append(
-                    ("hinge_across", name, _moved(name, R_J, children, R_B, orientations[segment.parent].T[2]))
-                )
+                side = orientations[segment.parent].T[2]
+                found.append(("hinge_across", name, _moved(name, R_J, children, R_B, side)))
             if name in trunks:
                 found.append(("frame_tilt", name, _frame_turned(name, R_B, jointed, R_B.T[2])))
             both = [_along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e) for e in _AXES]

@@ -8,7 +8,7 @@ import numpy as np
 from dynakin.arrays import Array
 from dynakin.filter.uncertainty.frames import Frames
 from dynakin.filter.uncertainty.geometry import Blocks, Parts
-from dynakin.filter.uncertainty.sizes import CENTRES, KINDS, Sizes
+from dynakin.filter.uncertainty.sizes import BY_PLACES, KINDS, Sizes
 from dynakin.results.measures.sources import MEASURED, PRIOR
 
 Factors = dict[str, tuple[float, float]]
@@ -85,7 +85,7 @@ def reported(frames: Frames, sizes: Sizes, parts: Parts, intensity: Array, moved
             factor = np.maximum(factor, least)
         variance = factor * np.square(sd)
         for kind in KINDS:
-            size = getattr(sizes, kind) * (farther if kind in CENTRES else 1.0)
+            size = getattr(sizes, kind) * (farther if kind in BY_PLACES else 1.0)
             variance = variance + size**2 * parts[kind][block]
         if sizes.inertia:  # the filter's own part has so much of it already
             variance = variance + np.maximum(1.0 - factor * frames.variance_scale, 0.0) * parts["inertia"][block]

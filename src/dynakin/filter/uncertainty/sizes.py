@@ -19,6 +19,8 @@ OF_JOINTS = get_args(Kind)
 KINDS = (*OF_JOINTS, "roll", "skin", "mass_centre", "limbs", "clock", "hands", "hips")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
 CENTRES = ("hinge_centre", "elbow_centre", "ball_centre", "spine_centre", "ball_across")
+"""What is farther off at joints that are less sure (`less_sure_joints`)."""
+BY_PLACES = (*CENTRES, "hinge_across")
 """What goes by how far markers have moved, too."""
 
 
@@ -28,8 +30,9 @@ class Sizes:
 
     Attributes:
         hinge_centre: m, of the centre of a joint with one or two axes (knee, ankle).
-        hinge_across: m, by which such a centre may besides lie elsewhere along the joint's axis (to the side): nothing
-            that moves shows it, so that what is estimated of lengths and places takes none of it.
+        hinge_across: m, by which such a centre may besides lie elsewhere along its parent's third axis (to the side),
+            which is nearly the axis of knees and ankles: nothing that moves shows it, so that what is estimated of
+            lengths and places takes none of it.
         elbow_centre: m, of the elbow's: its axis does not pass midway between the epicondyles' markers.
         ball_centre, ball_across: m, of the centre of one with three (hip) along the first two axes of its parent
             (forwards and up), and along the third (to the side).
@@ -164,7 +167,7 @@ SHOWS_ACROSS_RAD = np.radians(0.5)
 """The same of a centre to the side, by what the hip is adducted beyond what follows its flexion (`Turned.across`)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
-    hinge_across=0.0,
+    hinge_across=0.002,
     elbow_centre=0.0014,
     ball_centre=0.0016,
     spine_centre=0.0016,

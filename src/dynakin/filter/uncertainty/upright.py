@@ -61,20 +61,19 @@ class Turned(NamedTuple):
 def hips_turned(calibrated: CalibratedModel, q: Array) -> dict[str, Turned]:
     """Thigh -> how far its hip turns in free coordinates (T, K). Each leg by itself: of who stands on one and kicks
     with the other one hip shows nothing of its centre. Empty where there are no hips or no frames."""
-    spec, thighs = calibrated.spec, thighs_of(calibrated)
+    spec = calibrated.spec
     place = {name: k for k, name in enumerate(free_names(spec))}
     q = q[np.isfinite(q[:, : len(place)]).all(axis=1)]
     found = {}
     for segment in spec.segments if len(q) else ():
         own = [axis for axis in segment.axes if axis.kind == "rotation" and axis.coordinate in place]
-        if segment.name not in thighs or not own:
+        if not own or segment.name not in thighs_of(calibrated):
             continue
+        flexing, out_of_it = ([axis for axis in own if abs(axis.direction[k]) > ABOUT] for k in (2, 0))
         below = [axis for child in spec.segments if child.parent == segment.name for axis in child.axes]
-        flexing = [axis for axis in own if abs(axis.direction[2]) > ABOUT]
         flexing += [axis for axis in below if axis.kind == "rotation" and axis.coordinate in place]
         whole, bent, out = (
-            q[:, [place[axis.coordinate] for axis in axes]]
-            for axes in (own, flexing, [axis for axis in own if abs(axis.direction[0]) > ABOUT])
+            q[:, sorted({place[axis.coordinate] for axis in axes})] for axes in (own, flexing, out_of_it)
         )
         skin = np.column_stack([np.ones(len(q)), np.tanh(bent / SKIN_ANGLE_RAD)])
         beyond = out - skin @ np.linalg.lstsq(skin, out, rcond=None)[0]
