@@ -77,16 +77,16 @@ def extended(initial: CalibratedModel, noise: Noise, estimate: Collection[Quanti
     )
 
 
-def with_hips_shown(initial: CalibratedModel, q: Array) -> CalibratedModel:
+def with_hips_shown(initial: CalibratedModel, states: Array) -> CalibratedModel:
     """The same, of whose hips' centres that much alone is estimated as a recording shows of them: the rest of the prior
     variance is ``unshown_sd``, and the centres stay as near to where standing markers have them as it is large. The
     filter's skin fades, so that each second of a squat counts as another look, though skin is displaced in each as the
     joints are bent: it found centres 16 to 25 mm too far out and believed them to 4.
 
     Args:
-        q: (T, K) free coordinates of the recording.
+        states: (T, n) of a first run over the recording.
     """
-    turned = hips_turned(initial, q)
+    turned = hips_turned(initial, states)
     if initial.plan is None or initial.provenance.hips == "functional" or not turned:
         return initial
     legs = Turned(*np.sqrt(np.square([*turned.values()]).mean(axis=0)).tolist())

@@ -39,7 +39,7 @@ def parameters_of(
         kind = _KINDS[word]
         amount = kind == "length" and initial.x0[k] == 0.0
         # the prior of a correction to a measured place is what skin hides of that place
-        unseen = initial.unshown_sd.get(name, skin.get(owner, 0.0) if kind == "length" and not amount else 0.0)
+        unseen = skin.get(owner, 0.0) if kind == "length" and not amount else 0.0
         within = min(state[k] - initial.lower[k], initial.upper[k] - state[k])
         found.append(
             Parameter(
@@ -55,7 +55,7 @@ def parameters_of(
                 upper=_finite(initial.upper[k]),
                 at_bound=bool(within <= (_NEAR * sd[k] if amount else 0.0)),
                 estimated=True,
-                prior_sd=float(np.hypot(prior_sd[k], initial.unshown_sd.get(name, 0.0))),
+                prior_sd=float(prior_sd[k]),
                 skin_sd=unseen,
             )
         )

@@ -58,25 +58,33 @@ class Turned(NamedTuple):
     across: float
 
 
-def hips_turned(calibrated: CalibratedModel, q: Array) -> dict[str, Turned]:
-    """Thigh -> how far its hip turns in free coordinates (T, K). Each leg by itself: of who stands on one and kicks
-    with the other one hip shows nothing of its centre. Empty where there are no hips or no frames."""
+def hips_turned(calibrated: CalibratedModel, states: Array) -> dict[str, Turned]:
+    """Thigh -> how far its hip turns. Each leg by itself: of who stands on one and kicks with the other one hip shows
+    nothing of its centre. Empty where there are no hips or no frames.
+
+    Args:
+        states: (T, n), or their free coordinates alone (T, K): without the lengths that place hips, which angles go
+            along with as these are learned.
+    """
     spec = calibrated.spec
-    place = {name: k for k, name in enumerate(free_names(spec))}
-    q = q[np.isfinite(q[:, : len(place)]).all(axis=1)]
+    place = {name: k for k, name in enumerate(calibrated.names[: states.shape[1]])}
+    free = place.keys() & set(free_names(spec))
+    states = states[np.isfinite(states).all(axis=1)]
     found = {}
-    for segment in spec.segments if len(q) else ():
-        own = [axis for axis in segment.axes if axis.kind == "rotation" and axis.coordinate in place]
+    for segment in spec.segments if len(states) else ():
+        own = [axis for axis in segment.axes if axis.kind == "rotation" and axis.coordinate in free]
         if not own or segment.name not in thighs_of(calibrated):
             continue
         flexing, out_of_it = ([axis for axis in own if abs(axis.direction[k]) > ABOUT] for k in (2, 0))
         below = [axis for child in spec.segments if child.parent == segment.name for axis in child.axes]
-        flexing += [axis for axis in below if axis.kind == "rotation" and axis.coordinate in place]
+        flexing += [axis for axis in below if axis.kind == "rotation" and axis.coordinate in free]
         whole, bent, out = (
-            q[:, sorted({place[axis.coordinate] for axis in axes})] for axes in (own, flexing, out_of_it)
+            states[:, sorted({place[axis.coordinate] for axis in axes})] for axes in (own, flexing, out_of_it)
         )
-        skin = np.column_stack([np.ones(len(q)), np.tanh(bent / SKIN_ANGLE_RAD)])
-        beyond = out - skin @ np.linalg.lstsq(skin, out, rcond=None)[0]
+        lengths = [f"length/{term.parameter}" for term in segment.lengths]
+        learned = states[:, [place[name] for name in lengths if name in place]]
+        follows = np.column_stack([np.ones(len(states)), np.tanh(bent / SKIN_ANGLE_RAD), learned])
+        beyond = out - follows @ np.linalg.lstsq(follows, out, rcond=None)[0]
         found[segment.name] = Turned(*(float(np.sqrt(values.var(axis=0).sum())) for values in (whole, beyond)))
     return found
 
