@@ -138,6 +138,7 @@ def calibrated() -> Any:
         names=tuple(_core.Model(model).layout.names),
         x0=_core.Model(model).initial_state(),
         sd0=np.zeros(_core.Model(model).layout.size),
+        prior_sd={},
         plan=None,
         feet={"right": "shank"},
         soft_tissue_m=DECLARED,

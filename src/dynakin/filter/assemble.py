@@ -101,15 +101,17 @@ def assemble(
     data.update({f"{when}_covariance": (("element", "element_"), P) for when, P in covariances.items()})
     noise = config.get("noise", {})
     declared = 1.0 / np.sqrt(variance_scales(initial.names, used))
+    unshown = np.array([initial.unshown_sd.get(name, 0.0) for name in initial.names])
     parameters = parameters_of(
         initial,
         arrays["state"][-1],
-        declared * arrays["state_sd"][-1],
-        declared * np.sqrt(np.diag(covariances["initial"])),
+        np.hypot(declared * arrays["state_sd"][-1], unshown),
+        np.hypot(declared * np.sqrt(np.diag(covariances["initial"])), unshown),
         noise.get("length_skin_fraction", 0.0),
     )
     constants = [initial.names.index(p.name) for p in parameters if p.estimated]
-    data["state_sd"][:, constants] *= declared[constants]  # one deviation of a constant, wherever it is read
+    known = np.hypot(declared * data["state_sd"].values, unshown)[:, constants]
+    data["state_sd"][:, constants] = known  # one deviation of a constant, wherever it is read
     config = config | {
         "mass_kg": initial.mass_kg,
         "height_m": initial.height_m,

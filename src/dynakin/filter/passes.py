@@ -6,15 +6,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from dynakin.arrays import Array
 from dynakin.filter.adapt import CALIBRATED_S, calibrated_noise, frames_that_show
 from dynakin.filter.alignment import PASSES, run_in_step
+from dynakin.filter.augment import with_hips_shown
 from dynakin.filter.following_skin import following_skin, may_follow
 from dynakin.filter.measurements import Measurements
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
 from dynakin.messages import Message, note
 from dynakin.progress import Progress
+from dynakin.results.records import FOLLOWING
 from dynakin.settings.lag import frames_later
 
 
@@ -73,7 +77,8 @@ def passes(ready: Prepared, progress: Progress | None = None) -> Passed:
         notes.append(note("noise", text))
     skin = following_skin(tracker, arrays, time) if scaled else None
     seen = measured if skin is None else measured._replace(markers=measured.markers - skin.shift_m)
-    tracker = tracker.changed(found or tracker.noise)
+    followed = (arrays["tracking"] == FOLLOWING) & np.isfinite(arrays["state"]).all(axis=1)
+    tracker = tracker.changed(found or tracker.noise, with_hips_shown(calibrated, arrays["state"][followed]))
     arrays = tracker.run_late_arrays(late, seen, back)
     return Passed(tracker, arrays if skin is None else skin.put_back(arrays), measured, notes, clock)
 

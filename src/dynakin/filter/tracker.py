@@ -85,10 +85,16 @@ class Tracker:
         """Another one, at the start of the same model."""
         return self.changed(self.noise)
 
-    def changed(self, noise: Noise) -> Tracker:
-        """Another one, at the start of the same model with other noise, which asks for the same states."""
+    def changed(self, noise: Noise, calibrated: CalibratedModel | None = None) -> Tracker:
+        """Another one, at the start of the same model with other noise, which asks for the same states.
+
+        Args:
+            calibrated: the same model that starts elsewhere or less surely.
+        """
         ahead_s = 0.0 if self._look_ahead is None else self._look_ahead.horizon_s
-        return Tracker(self.calibrated, noise, self.estimate, self.lag, self.plates, self._assigned, ahead_s)
+        return Tracker(
+            calibrated or self.calibrated, noise, self.estimate, self.lag, self.plates, self._assigned, ahead_s
+        )
 
     @property
     def state(self) -> Array:

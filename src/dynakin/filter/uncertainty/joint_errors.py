@@ -118,7 +118,7 @@ class JointErrors:
         found = np.zeros(len(self.kinds))
         if calibrated.plan is None or calibrated.provenance.hips == "functional":
             return found
-        sd = dict(zip(calibrated.names, calibrated.sd0, strict=True))
+        sd = calibrated.prior_sd
         for name in thighs_of(calibrated):
             own = [k for k, kind in enumerate(self.kinds) if self.joints[k] == name and kind in BALLS]
             terms = next(segment.lengths for segment in calibrated.spec.segments if segment.name == name)

@@ -11,8 +11,9 @@ from dynakin.arrays import Array
 from dynakin.bindings import _core
 from dynakin.filter.uncertainty.frames import Frame, differences
 from dynakin.filter.uncertainty.geometry import Geometry, Parts
+from dynakin.filter.uncertainty.joint_errors import BALLS
 from dynakin.filter.uncertainty.sizes import OF_JOINTS, hips_unshown, less_sure
-from dynakin.filter.uncertainty.upright import rolling_more, rolls
+from dynakin.filter.uncertainty.upright import Turned, rolling_more, rolls
 from dynakin.model.calibration.calibrated import CalibratedModel
 
 
@@ -34,15 +35,18 @@ class Joints:
         self._hips_open_m = np.append(errors.hips_open_m(calibrated), none)
         self._hips_unshown_m = np.zeros(len(kinds))
 
-    def with_hips(self, turned: Mapping[str, float]) -> Joints:
+    def with_hips(self, turned: Mapping[str, Turned]) -> Joints:
         """The same in a recording in which hips turn so far, of what the priors leave open of their centres.
 
         Args:
             turned: as of `hips_turned`.
         """
-        other, joints = copy(self), self._geometry.errors.joints
-        unshown = [hips_unshown(turned[joint]) if joint in turned else 0.0 for joint in joints]
-        other._hips_unshown_m = self._hips_open_m * np.append(unshown, np.zeros(len(self._rolls)))
+        other, errors = copy(self), self._geometry.errors
+        unshown = np.zeros(len(self._hips_open_m))
+        for joint, each in turned.items():
+            own = [k for k, kind in enumerate(errors.kinds) if errors.joints[k] == joint and kind in BALLS]
+            unshown[own] = hips_unshown(each)[: len(own)]
+        other._hips_unshown_m = self._hips_open_m * unshown
         return other
 
     def variances(self, frame: Frame) -> Parts:

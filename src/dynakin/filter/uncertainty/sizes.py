@@ -10,6 +10,7 @@ import numpy as np
 
 from dynakin.arrays import Array
 from dynakin.filter.uncertainty.joint_errors import Kind
+from dynakin.filter.uncertainty.upright import Turned
 from dynakin.model.calibration.calibrated import CalibratedModel, Hips
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.plan import angles_of
@@ -162,6 +163,11 @@ SHOWS_HIPS_RAD = np.radians(2.0)
 """How far a hip turns (`hips_turned`) where half of the variance is left that regressions leave of its centre: a
 filter whose skin fades learns from a posture that is held, too, and does not know that skin stays displaced there.
 Chosen for one person on one leg for 20 s; two others judge (docs/validation/deviations.md)."""
+SHOWS_ACROSS_RAD = np.radians(0.5)
+"""The same of a centre to the side, by what the hip is adducted beyond what follows its flexion (`Turned.across`), by
+the square of that: of a small angle most is skin's itself. Slow squats have 0.1 to 0.2 deg (their truth 0.1), recorded
+ones 0.8 and 1.2, walks 3. Chosen on `truth3d`'s squats 1 to 4 and slow ones, others judge
+(docs/validation/deviations.md)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
     hinge_across=0.002,
@@ -204,9 +210,11 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     return replace(sizes, mass_centre=farther * sizes.mass_centre, **more)
 
 
-def hips_unshown(turned_rad: float) -> float:
-    """Part of what regressions leave open of a hip's centre that stays so where it turns so far (`hips_turned`)."""
-    return float(1.0 / np.hypot(1.0, turned_rad / SHOWS_HIPS_RAD))
+def hips_unshown(turned: Turned) -> Array:
+    """(3,) part of what regressions leave open of a hip's centre that stays so where it turns so far (`hips_turned`):
+    forwards, up and to the side."""
+    within, across = turned.in_all / SHOWS_HIPS_RAD, (turned.across / SHOWS_ACROSS_RAD) ** 2
+    return np.asarray(1.0 / np.hypot(1.0, [within, within, across]))
 
 
 def less_sure(calibrated: CalibratedModel, kinds: Sequence[Kind], joints: Sequence[str]) -> Array:

@@ -24,6 +24,7 @@ from dynakin.filter.uncertainty.mass_centres import Inertia, MassCentres
 from dynakin.filter.uncertainty.reported import movement_intensity, reported
 from dynakin.filter.uncertainty.sizes import KINDS, Sizes, usual_sizes
 from dynakin.filter.uncertainty.skin import Skin
+from dynakin.filter.uncertainty.upright import Turned
 from dynakin.messages import Message, warning
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.times import frames_apart
@@ -84,11 +85,11 @@ class Systematic:
         clock_sd_s: float,
         in_hands_kg: float = 0.0,
         skin: float = 0.0,
-        hips_turned: Mapping[str, float] = MappingProxyType({}),
+        hips_turned: Mapping[str, Turned] = MappingProxyType({}),
     ) -> Systematic:
         """The same, where the plates' clock is less sure than in a walk whose segments are all marked, hands may hold
-        what the model does not have, more of skin's displacement was found than usual, or hips turn (`hips_turned`,
-        rad) so little that their centres stay where standing markers have them."""
+        what the model does not have, more of skin's displacement was found than usual, or hips turn (`hips_turned`)
+        so little that their centres stay where standing markers have them."""
         sizes, other = self.sizes, copy(self)
         other.sizes = replace(sizes, clock=max(clock_sd_s, sizes.clock), hands=in_hands_kg).with_skin(skin)
         other._errors = [each for each in self._errors if each is not self._joints]

@@ -4,6 +4,7 @@ centres that roll."""
 from __future__ import annotations
 
 from copy import copy
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,9 @@ from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.joint_motion import SKIN_ANGLE_RAD
 from dynakin.model.spec import free_coordinates, free_names
+
+ABOUT = 0.7
+"""Part of an axis that points somewhere from which on it turns about that."""
 
 
 def floats(segment: _core.SegmentSpec) -> bool:
@@ -40,19 +44,48 @@ def _on_root(calibrated: CalibratedModel) -> set[str]:
     return {segment.name for segment in calibrated.spec.segments if segment.parent in roots}
 
 
-def hips_turned(calibrated: CalibratedModel, q: Array) -> dict[str, float]:
-    """Thigh -> rad, how far its hip turns about its mean in free coordinates (T, K): root mean square, of all axes
-    together. Each leg by itself: of who stands on one and kicks with the other one hip shows nothing of its centre.
-    Empty where there are no hips or no frames."""
+class Turned(NamedTuple):
+    """How far a hip turns about its mean, rad, root mean square.
+
+    Attributes:
+        in_all: about all axes together: what shows its centre within the pelvis' sagittal plane.
+        across: in adduction, beyond what follows flexion of hip and knee: seen from the thigh a centre that lies
+            farther out moves as it is adducted, and skin that follows flexion moves as that does. How a thigh turns
+            about its own length would show it as well, but is half skin.
+    """
+
+    in_all: float
+    across: float
+
+
+def hips_turned(calibrated: CalibratedModel, states: Array) -> dict[str, Turned]:
+    """Thigh -> how far its hip turns. Each leg by itself: of who stands on one and kicks with the other one hip shows
+    nothing of its centre. Empty where there are no hips or no frames.
+
+    Args:
+        states: (T, n), or their free coordinates alone (T, K): without the lengths that place hips, which angles go
+            along with as these are learned.
+    """
     spec = calibrated.spec
-    place = {name: k for k, name in enumerate(free_names(spec))}
-    q = q[np.isfinite(q).all(axis=1)]
+    place = {name: k for k, name in enumerate(calibrated.names[: states.shape[1]])}
+    free = place.keys() & set(free_names(spec))
+    states = states[np.isfinite(states).all(axis=1)]
     found = {}
-    for segment in spec.segments if len(q) else ():
-        turns = {axis.coordinate for axis in segment.axes if axis.kind == "rotation"}
-        own = sorted(place[name] for name in turns & place.keys())
-        if own and segment.name in thighs_of(calibrated):
-            found[segment.name] = float(np.sqrt(q[:, own].var(axis=0).sum()))
+    for segment in spec.segments if len(states) else ():
+        own = [axis for axis in segment.axes if axis.kind == "rotation" and axis.coordinate in free]
+        if not own or segment.name not in thighs_of(calibrated):
+            continue
+        flexing, out_of_it = ([axis for axis in own if abs(axis.direction[k]) > ABOUT] for k in (2, 0))
+        below = [axis for child in spec.segments if child.parent == segment.name for axis in child.axes]
+        flexing += [axis for axis in below if axis.kind == "rotation" and axis.coordinate in free]
+        whole, bent, out = (
+            states[:, sorted({place[axis.coordinate] for axis in axes})] for axes in (own, flexing, out_of_it)
+        )
+        lengths = [f"length/{term.parameter}" for term in segment.lengths]
+        learned = states[:, [place[name] for name in lengths if name in place]]
+        follows = np.column_stack([np.ones(len(states)), np.tanh(bent / SKIN_ANGLE_RAD), learned])
+        beyond = out - follows @ np.linalg.lstsq(follows, out, rcond=None)[0]
+        found[segment.name] = Turned(*(float(np.sqrt(values.var(axis=0).sum())) for values in (whole, beyond)))
     return found
 
 

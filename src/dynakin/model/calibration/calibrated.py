@@ -132,6 +132,8 @@ class CalibratedModel(StartingState):
         held: coordinate -> why nothing shows it, where it is held at an angle for lack of markers: results have none.
         provenance: where places of markers and joints come from.
         joint_prior: how elements hang together at first; the others are independent.
+        unshown_sd: element -> the part of its prior deviation that the recording does not show, and that ``sd0`` is
+            without: it is not estimated (`filter.augment.with_hips_shown`).
         coupled: coordinates of an OpenSim model that follow others, and are none of ``spec``.
         in_radians: rotations, of ``coupled`` too, that OpenSim takes from a table in degrees as radians all the same.
     """
@@ -160,6 +162,7 @@ class CalibratedModel(StartingState):
     held: dict[str, str] = field(default_factory=dict)
     provenance: Provenance = Provenance()
     joint_prior: JointPrior | None = None
+    unshown_sd: dict[str, float] = field(default_factory=dict)
     contacts: dict[str, str] = field(default_factory=dict)
     coupled: Coupled | None = None
     in_radians: frozenset[str] = frozenset()
@@ -188,6 +191,12 @@ class CalibratedModel(StartingState):
             "off by 25 N m and more (their deviations hold about 25), those of the hips by less."
         )
         return [warning("physique", text)]
+
+    @property
+    def prior_sd(self) -> dict[str, float]:
+        """Element -> standard deviation before anything is seen, shown or not."""
+        known = zip(self.names, self.sd0, strict=True)
+        return {name: float(np.hypot(sd, self.unshown_sd.get(name, 0.0))) for name, sd in known}
 
     @property
     def tree(self) -> Tree:
