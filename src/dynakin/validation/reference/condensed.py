@@ -84,7 +84,7 @@ def stacked(
     weight = 1.0 / np.asarray(sigma)
     rows = ((y[known] - Y[known][:, :, ~estimated] @ table[~estimated]) * weight).ravel()
     columns = (Y[known][:, :, estimated] * weight[:, None]).reshape(-1, unknowns) * scale[estimated]
-    R: Array = np.linalg.qr(np.column_stack([columns, rows]), mode="r")
+    R: Array = np.asarray(np.linalg.qr(np.column_stack([columns, rows]), mode="r"))
     is_mass = np.array([name.endswith("/mass") for name in names])
     strength = 0.0 if mass_kg is None else np.sqrt(frames) / TOTAL_MASS_SD_KG
     held = float(table[is_mass & ~estimated].sum())
