@@ -84,21 +84,21 @@ def with_hips_shown(initial: CalibratedModel, states: Array) -> CalibratedModel:
     joints are bent: it found centres 16 to 25 mm too far out and believed them to 4.
 
     Args:
-        states: (T, n) of a first run over the recording.
+        states: (T, n) of a first run over the recording, or over as much of it as shows how it moves.
     """
     turned = hips_turned(initial, states)
     if initial.plan is None or initial.provenance.hips == "functional" or not turned:
         return initial
     legs = Turned(*np.sqrt(np.square([*turned.values()]).mean(axis=0)).tolist())
     unshown, place = hips_unshown(legs), {name: k for k, name in enumerate(initial.names)}
-    sd0, left = initial.sd0.copy(), dict[str, float]()
+    prior, sd0, left = initial.prior_sd, initial.sd0.copy(), dict[str, float]()
     for segment in initial.spec.segments:
         for term in segment.lengths if segment.name in turned else ():
             k = place.get(f"length/{term.parameter}")
             if k is not None:
                 part = float(np.linalg.norm(unshown * np.asarray(term.direction)))
-                sd0[k] = initial.sd0[k] * np.sqrt(max(1.0 - part**2, LEAST_SHOWN**2))
-                left[initial.names[k]] = float(initial.sd0[k]) * part
+                whole = prior[initial.names[k]]
+                sd0[k], left[initial.names[k]] = whole * np.sqrt(max(1.0 - part**2, LEAST_SHOWN**2)), whole * part
     return replace(initial, sd0=sd0, unshown_sd=left)
 
 

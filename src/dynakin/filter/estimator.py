@@ -36,6 +36,7 @@ from dynakin.recordings.low_passed import found_low_pass
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.tracking import without_lost
+from dynakin.results.records import FOLLOWING
 from dynakin.settings import presets
 from dynakin.settings.contacts import DeclaredContact, declared
 from dynakin.settings.lag import ALL_FRAMES, check_lag, frames_later, known_lag, lag_frames
@@ -295,7 +296,7 @@ class Estimator:
                 ground.clock_sd_s,
                 ground.in_hands_kg,
                 skin_found(calibrated, arrays),
-                hips_turned(calibrated, arrays["state"]),
+                hips_turned(calibrated, arrays["state"][arrays["tracking"] == FOLLOWING]),
             )
         undeclared = ready.undeclared(measured.contacts)
         estimate = assemble(

@@ -6,8 +6,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from dynakin.arrays import Array
 from dynakin.filter.adapt import CALIBRATED_S, calibrated_noise, frames_that_show
 from dynakin.filter.alignment import PASSES, run_in_step
@@ -77,8 +75,9 @@ def passes(ready: Prepared, progress: Progress | None = None) -> Passed:
         notes.append(note("noise", text))
     skin = following_skin(tracker, arrays, time) if scaled else None
     seen = measured if skin is None else measured._replace(markers=measured.markers - skin.shift_m)
-    followed = (arrays["tracking"] == FOLLOWING) & np.isfinite(arrays["state"]).all(axis=1)
-    tracker = tracker.changed(found or tracker.noise, with_hips_shown(calibrated, arrays["state"][followed]))
+    if tracker.systematic is not None:  # which gives back to deviations what is kept from the filter
+        calibrated = with_hips_shown(calibrated, arrays["state"][arrays["tracking"] == FOLLOWING])
+    tracker = tracker.changed(found or tracker.noise, calibrated)
     arrays = tracker.run_late_arrays(late, seen, back)
     return Passed(tracker, arrays if skin is None else skin.put_back(arrays), measured, notes, clock)
 

@@ -96,7 +96,8 @@ the plates of a real squat, 100 ms ahead."""
 def expected_ahead(model: _core.Model, time: Array, states: Array, horizon_s: float) -> tuple[Array, Array]:
     """Markers (T, M, 3) and wrench (T, 6) of each frame as `LookAhead` expects them ``horizon_s`` before, from states
     (T, n); NaN where there is none."""
-    frames, look = span_frames(time, horizon_s), LookAhead(model, horizon_s)
+    frames = span_frames(time, horizon_s)
+    look = LookAhead(model, frames * step_of(time))  # at low rates these are not quite the horizon
     places, wrench = np.full((len(time), len(model.marker_names), 3), np.nan), np.full((len(time), 6), np.nan)
     for k, state in enumerate(states[: len(time) - frames]):
         if not np.isfinite(state).all():

@@ -16,6 +16,7 @@ from dynakin.filter.augment import with_hips_shown
 from dynakin.filter.uncertainty.frames import _STEP_S
 from dynakin.filter.uncertainty.geometry import BLOCKS
 from dynakin.filter.uncertainty.joint_errors import OF_FRAMES, JointErrors, Kind
+from dynakin.filter.uncertainty.joints import Joints
 from dynakin.filter.uncertainty.sizes import (
     LAID,
     LANDMARKS,
@@ -400,7 +401,24 @@ def test_what_a_squat_does_not_show_of_hips_is_in_their_deviations() -> None:
     assert unshown["length/hip_outward"] > 3.0 * unshown["length/hip_forward"]
     systematic = tracked.tracker.systematic
     assert systematic is not None
-    assert set(np.round(systematic.geometry.errors.hips_open_m(tracked.tracker.calibrated), 4)) == {0.0, 0.01}
+    calibrated, errors = tracked.tracker.calibrated, systematic.geometry.errors
+    assert set(np.round(errors.hips_open_m(calibrated, calibrated.prior_sd), 4)) == {0.0, 0.01}
+    # what the filter was not given is in deviations even where later frames turn hips every way, and only once
+    kept = errors.hips_open_m(calibrated, unshown)
+    for turned in (Turned(0.0, 0.0), Turned(9.0, 9.0)):
+        found_m = Joints(systematic.geometry, calibrated).with_hips(dict.fromkeys(("thigh_r", "thigh_l"), turned))
+        least = kept if turned.across else errors.hips_open_m(calibrated, calibrated.prior_sd)
+        np.testing.assert_allclose(found_m._hips_unshown_m[: len(kept)], least, rtol=0.02, atol=1e-6)
+    start = tracked.tracker.calibrated
+    again = with_hips_shown(start, tracked.estimate.data["state"].values)
+    assert again.prior_sd == pytest.approx(start.prior_sd, rel=1e-3)
+
+
+def test_hips_are_estimated_whole_where_no_deviation_would_hold_the_rest() -> None:
+    recording = simulate("fullbody", "squat", 1, 5.0, markers="opencap").recording
+    noise = Noise(systematic_scale=0.0)
+    tracked = dynakin.Estimator(load_model("fullbody", WHO), noise).track(recording)
+    assert not tracked.tracker.calibrated.unshown_sd
 
 
 def test_a_hinge_may_lie_elsewhere_along_its_axis_which_nothing_that_moves_shows() -> None:

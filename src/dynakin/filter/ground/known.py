@@ -71,7 +71,7 @@ def known_ground(
     if ground.loads is not None and ground.loads.on.any():
         turn = NO_ERRORS if about(ground.notes, "rate") or says_carried(ground.notes) else _turn(on_ground, known)
         clock, ground, known = _in_step(as_it_is, coarse, on_ground, ground, known, not turn.said)
-        ground = ground.with_turn(turn)
+        ground = ground if ground.loads is None else ground.with_turn(turn)
     if ground.loads is not None and ground.loads.misgiven:  # in step: late plates are pressed where nobody is any more
         raise ConfigError(ground.loads.misgiven)
     moved = () if clock.taken is None else (_taken_in_words(clock.taken, recording, not initial.unseen_kg),)

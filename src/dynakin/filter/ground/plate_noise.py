@@ -86,7 +86,7 @@ def _in_words(name: str, sd: Array) -> str:
     return (
         f"{name} has white noise of up to {sd[:3].max():.2g} N and {sd[3:].max():.2g} N m in each frame (standard "
         f"deviation; usual plates {NOISE_N:g} N, {NOISE_NM:g} N m): moments of the legs and the feet's forces follow "
-        "most of it, and their deviations hold it."
+        "most of it, and their deviations hold it as long as one foot alone stands there."
     )
 
 

@@ -4,7 +4,7 @@ its segments may be displaced too: their first moments are states."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Literal
@@ -112,13 +112,12 @@ class JointErrors:
             tuple(segment.name for segment in estimated),
         )
 
-    def hips_open_m(self, calibrated: CalibratedModel) -> Array:
-        """(S,) m, what the priors leave open of the centres of hips along each source; 0 of all others, and of hips
-        that no regression from the pelvis has."""
+    def hips_open_m(self, calibrated: CalibratedModel, sd: Mapping[str, float]) -> Array:
+        """(S,) m, what deviations of lengths leave open of the centres of hips along each source; 0 of all others, and
+        of hips that no regression from the pelvis has."""
         found = np.zeros(len(self.kinds))
         if calibrated.plan is None or calibrated.provenance.hips == "functional":
             return found
-        sd = calibrated.prior_sd
         for name in thighs_of(calibrated):
             own = [k for k, kind in enumerate(self.kinds) if self.joints[k] == name and kind in BALLS]
             terms = next(segment.lengths for segment in calibrated.spec.segments if segment.name == name)

@@ -19,7 +19,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 
 class Joints:
     """Kinds `OF_JOINTS`, "roll" (how far a joint's centre moves with the square of its angle), and "hips" (what the
-    priors leave open of their centres and a recording does not show: nothing until `with_hips`)."""
+    priors leave open of their centres and a recording does not show; until `with_hips` what the filter lacks of them)."""
 
     def __init__(self, geometry: Geometry, calibrated: CalibratedModel) -> None:
         self._geometry, errors = geometry, geometry.errors
@@ -32,8 +32,9 @@ class Joints:
         self._columns = {kind: np.flatnonzero(kinds == kind) for kind in (*OF_JOINTS, "roll")}
         none = np.zeros(len(self._rolls))
         self._times = np.append(less_sure(calibrated, errors.kinds, errors.joints), none + 1.0)
-        self._hips_open_m = np.append(errors.hips_open_m(calibrated), none)
-        self._hips_unshown_m = np.zeros(len(kinds))
+        self._hips_open_m = np.append(errors.hips_open_m(calibrated, calibrated.prior_sd), none)
+        self._hips_kept_m = np.append(errors.hips_open_m(calibrated, calibrated.unshown_sd), none)
+        self._hips_unshown_m = self._hips_kept_m
 
     def with_hips(self, turned: Mapping[str, Turned]) -> Joints:
         """The same in a recording in which hips turn so far, of what the priors leave open of their centres.
@@ -46,7 +47,8 @@ class Joints:
         for joint, each in turned.items():
             own = [k for k, kind in enumerate(errors.kinds) if errors.joints[k] == joint and kind in BALLS]
             unshown[own] = hips_unshown(each)[: len(own)]
-        other._hips_unshown_m = self._hips_open_m * unshown
+        # what the filter is not given counts even where frames behind a first run show it
+        other._hips_unshown_m = np.maximum(self._hips_open_m * unshown, self._hips_kept_m)
         return other
 
     def variances(self, frame: Frame) -> Parts:
