@@ -19,7 +19,8 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 
 class Joints:
     """Kinds `OF_JOINTS`, "roll" (how far a joint's centre moves with the square of its angle), and "hips" (what the
-    priors leave open of their centres and a recording does not show; until `with_hips` what the filter lacks of them)."""
+    priors leave open of their centres and a recording does not show; until `with_hips` what the filter lacks of
+    them)."""
 
     def __init__(self, geometry: Geometry, calibrated: CalibratedModel) -> None:
         self._geometry, errors = geometry, geometry.errors
