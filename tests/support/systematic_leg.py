@@ -139,6 +139,7 @@ def calibrated() -> Any:
         x0=_core.Model(model).initial_state(),
         sd0=np.zeros(_core.Model(model).layout.size),
         prior_sd={},
+        unshown_sd={},
         plan=None,
         feet={"right": "shank"},
         soft_tissue_m=DECLARED,
