@@ -94,6 +94,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
         soft_tissue_m=np.zeros(len(SPEC.markers)),
         x0=data.x0,
         sd0=prior_sd(layout),
+        unshown_sd={},
         lower=-endless,
         upper=endless,
         table=np.full(layout.size, np.nan),

@@ -32,6 +32,8 @@ STANCE_M, STANCE_S, MOST = 0.012, 0.25, 0.5
 """The same on average over the frames in which one plate bears more than this part of the load, as of a walk over a
 plate a stance: 0.0016 to 0.0021 in `truth3d`'s walks that chose, 0.0061 and 0.0073 in real ones; of others 0.0017 to
 0.0028, 0.0011 to 0.0080; where that plate reads 10 N m too much or too little 0.0145 to 0.018."""
+BRIEF = 6.0
+"""Times the median beyond which a frame is not judged: a kick of a plate for some frames is the filter's to refuse."""
 FOLLOWS = 0.95
 """What is off is laid to a gain, or a sign, where it follows the plates' free moments (correlation)."""
 
@@ -109,6 +111,8 @@ def _off(needed: Needed, wrench: Array, plates: Array) -> _Off | None:
         both = np.column_stack([turning, low_pass(free[part, None], rate, CUTOFF_HZ)])
         found.append(np.column_stack([smoothed(both, judged, rate), own[:, part, UPWARDS].T])[judged])
     every = np.concatenate(found)
+    size = np.abs(every[:, 0])
+    every = every[size <= BRIEF * np.median(size)] if len(every) else every
     push = every[:, 2:].T
     return _Off(every[:, 0], every[:, 1], push > MOST * push.sum(axis=0), rate) if len(every) else None
 

@@ -45,7 +45,8 @@ def zero_of(name: str, wrench: Array, normal: Array, rate: float, *, emptied: bo
             f"of the recording{': taken as empty there' if emptied else ''}. Zero it before the trial."
         )
         return Zero(np.zeros(6), min(reads, 0.0), True, [warning("plates", text)])
-    calm = _averaged(wrench, rate)
+    each = max(round(_CALM_S * rate), 1) if np.isfinite(rate) else 1
+    calm = _averaged(wrench, each)
     along = calm[:, :3] @ normal
     known = np.nan_to_num(along, nan=np.inf)
     own = np.abs(known - reads) < UNLOADED_N
@@ -53,7 +54,8 @@ def zero_of(name: str, wrench: Array, normal: Array, rate: float, *, emptied: bo
     if reads < 0.0 and steadily and _of_nobody(calm[own, :3] - np.outer(along[own], normal)):
         text = f"{name} reads {reads:.3g} N where nobody stands on it: it is taken off over the whole trial."
         said = (warning if -reads > UNLOADED_N else note)("zero", text)
-        return Zero(np.nanmedian(calm[own], axis=0), 0.0, False, [said])
+        samples = np.repeat(own, each)[: len(wrench)]
+        return Zero(np.nanmedian(wrench[samples], axis=0), 0.0, False, [said])
     if abs(reads) < _OFFSET_WORTH_A_NOTE_N:
         return Zero(np.zeros(6), reads, False, [])
     why = "with a load across it" if steadily else "not steadily"
@@ -63,9 +65,8 @@ def zero_of(name: str, wrench: Array, normal: Array, rate: float, *, emptied: bo
     )
 
 
-def _averaged(values: Array, rate: float) -> Array:
-    """Means (K, C) of values (N, C), sampled at ``rate`` Hz, over each `_CALM_S`, of what is known of them."""
-    each = max(round(_CALM_S * rate), 1) if np.isfinite(rate) else 1
+def _averaged(values: Array, each: int) -> Array:
+    """Means (K, C) of so many values (N, C) each, of what is known of them."""
     lacking = -len(values) % each
     parts = np.concatenate([values, np.full((lacking, values.shape[1]), np.nan)])
     return mean_seen(parts.reshape(-1, each, values.shape[1], 1), axis=1)[..., 0]
